@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "core/render/renderer.hpp"
+#include "core/render/device_renderer.hpp"
 
 namespace isowave::core::bench {
 
@@ -30,7 +30,7 @@ Camera turned(Camera camera);
 /// request: its camera does not matter. The renderer must have drawn a frame of the isovalue
 /// before: a driver may compile a kernel when it first runs, and an isovalue's first frame finds
 /// its blocks.
-std::vector<ViewTimes> measure_views(Renderer &renderer, const std::vector<Camera> &cameras,
+std::vector<ViewTimes> measure_views(DeviceRenderer &renderer, const std::vector<Camera> &cameras,
                                      const FrameRequest &request, std::uint32_t rounds);
 
 double num_passes(const FrameStats &frame);

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/render/renderer.hpp"
+#include "core/render/device_renderer.hpp"
 #include "reference/watertight.hpp"
 
 namespace isowave::core {

@@ -12,7 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/ocl/kernel_cache.hpp"
-#include "core/render/renderer.hpp"
+#include "core/render/device_renderer.hpp"
 #include "core/stages/march_packets.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/run_program.hpp"
@@ -55,7 +55,7 @@ class CompileOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
 
   /// Draws in every way that the options allow. Nothing may be left to compile.
   void expect_all_compiled(const RendererOptions &options) {
-    Renderer renderer(device_, volume_, options);
+    DeviceRenderer renderer(device_, volume_, options);
     EXPECT_GT(device_.compile_ms(), 0);
     const std::vector<std::string> programs = device_.built_programs();
     std::vector<std::string> late;
@@ -118,7 +118,7 @@ TEST_P(CompileOnDevice, WhatIsNotLaunchedIsNotBuilt) {
     ocl::Device device(GetParam());
     options.packets = packets;
     options.with_shading = shading;
-    Renderer renderer(device, volume_, options);
+    DeviceRenderer renderer(device, volume_, options);
     renderer.render({.camera = cameras_[0],
                      .isovalue = 0.1f,
                      .voxel_pixels = options.with_levels ? 2.0 : 0.0,
@@ -160,7 +160,7 @@ TEST_P(CompileOnDevice, WhatIsNotLaunchedIsNotBuilt) {
 TEST_P(CompileOnDevice, FirstFrameIsThatOfANewRenderer) {
   for (const PipelineKind pipeline : {PipelineKind::kRays, PipelineKind::kBlocks}) {
     ocl::Device device(GetParam(), true);
-    Renderer renderer(device, volume_, {.size = kSize, .pipeline = pipeline});
+    DeviceRenderer renderer(device, volume_, {.size = kSize, .pipeline = pipeline});
     EXPECT_THAT(device.timer().collect(), IsEmpty());
     EXPECT_EQ(device.ledger().current(), renderer.memory_plan().total());
     const FrameStats first = renderer.render({cameras_[0], 0.1f});

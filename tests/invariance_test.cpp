@@ -7,7 +7,7 @@
 #include <numeric>
 
 #include "core/base/error.hpp"
-#include "core/render/renderer.hpp"
+#include "core/render/device_renderer.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/test_pipelines.hpp"
 
@@ -40,7 +40,7 @@ class InvarianceOnDevice : public testing::TestWithParam<PipelineOnDevice> {
   /// Draws the default view with fresh options; it must be the twin's.
   FrameStats check(const TestVolume &volume, const RendererOptions &options) {
     const Camera camera = orbit_cameras(volume.info(), 1)[0];
-    Renderer renderer(device_, volume.compressed, GetParam().with(options));
+    DeviceRenderer renderer(device_, volume.compressed, GetParam().with(options));
     const FrameStats stats = renderer.render({camera, kIsovalue});
     expect_same_hits(renderer.hits(), twin_hits(volume, camera, options.size, kIsovalue),
                      options.size.width);
@@ -183,9 +183,10 @@ TEST_P(InvarianceOnDevice, SmallScannedSpeculation) {
       more += double(scanned.passes[i].counts.spec_count) - global.passes[i].counts.spec_count;
     EXPECT_TRUE(limit == 3 || more > 0) << "else this scene tests nothing";
   }
-  EXPECT_THROW(Renderer(device_, volume.compressed,
-                        {.size = kMedium, .pipeline = PipelineKind::kRays, .scanned_pairs = true}),
-               Error);
+  EXPECT_THROW(
+      DeviceRenderer(device_, volume.compressed,
+                     {.size = kMedium, .pipeline = PipelineKind::kRays, .scanned_pairs = true}),
+      Error);
 }
 
 // ---- cache size
@@ -238,8 +239,8 @@ TEST_P(InvarianceOnDevice, ManyViewsThroughFewSlots) {
   for (const std::uint32_t slots : {13u, 9u, 31u}) {
     if (is_slow() && slots != 13) continue;
     SCOPED_TRACE(fmt::format("{} slots", slots));
-    Renderer renderer(device_, volume.compressed,
-                      GetParam().with({.size = size, .cache_slots = slots}));
+    DeviceRenderer renderer(device_, volume.compressed,
+                            GetParam().with({.size = size, .cache_slots = slots}));
     for (const Camera &camera : orbit_cameras(volume.info(), 2)) {
       expect_consistent(renderer.render({camera, kIsovalue}), renderer.options());
       expect_same_hits(renderer.hits(), twin_hits(volume, camera, size, kIsovalue), size.width);
@@ -285,7 +286,7 @@ TEST_P(InvarianceOnDevice, ImageShapes) {
 TEST_P(InvarianceOnDevice, WarmCacheDecodesNothing) {
   const TestVolume volume = small_volume();
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
-  Renderer renderer(device_, volume.compressed, GetParam().with({.size = kSmall}));
+  DeviceRenderer renderer(device_, volume.compressed, GetParam().with({.size = kSmall}));
   const FrameStats cold = renderer.render({camera, kIsovalue});
   const auto hits = renderer.hits();
   const FrameStats warm = renderer.render({camera, kIsovalue});
@@ -312,8 +313,8 @@ TEST_P(InvarianceOnDevice, FramesInAnyOrderEqualFreshRenderers) {
   std::mt19937 random(kSeed);
   SCOPED_TRACE(fmt::format("seed {}", kSeed));
   for (const std::uint32_t slots : {0u, 150u}) {
-    Renderer renderer(device_, volume.compressed,
-                      GetParam().with({.size = kFrame, .cache_slots = slots}));
+    DeviceRenderer renderer(device_, volume.compressed,
+                            GetParam().with({.size = kFrame, .cache_slots = slots}));
     std::shuffle(frames.begin(), frames.end(), random);
     for (const Frame &frame : frames) {
       SCOPED_TRACE(
@@ -329,8 +330,8 @@ TEST_P(InvarianceOnDevice, FramesInAnyOrderEqualFreshRenderers) {
 
 TEST_P(InvarianceOnDevice, MemoryIsFixedBeforeTheFirstFrame) {
   const TestVolume volume = small_volume();
-  Renderer renderer(device_, volume.compressed,
-                    GetParam().with({.size = kTiny, .cache_slots = 20}));
+  DeviceRenderer renderer(device_, volume.compressed,
+                          GetParam().with({.size = kTiny, .cache_slots = 20}));
   const ocl::MemoryLedger &ledger = device_.ledger();
   const std::uint64_t current = ledger.current(), peak = ledger.peak();
   EXPECT_GT(current, 0u);
@@ -363,7 +364,7 @@ TEST_P(InvarianceOnDevice, PicturesOfPassesOnlyGainHits) {
   const auto of_cells = twin_hits(volume, camera, kFrame, kIsovalue, Normals::kCell);
   for (const std::uint32_t slots : {0u, 100u}) {
     SCOPED_TRACE(fmt::format("{} slots", slots));
-    Renderer renderer(
+    DeviceRenderer renderer(
         device_, volume.compressed,
         GetParam().with({.size = kFrame,
                          .cache_slots = slots,
@@ -400,8 +401,8 @@ TEST_P(InvarianceOnDevice, PicturesOfPassesOnlyGainHits) {
 TEST_P(InvarianceOnDevice, CancelledFrameLeavesNoTrace) {
   const TestVolume volume = small_volume();
   const auto cameras = orbit_cameras(volume.info(), 2);
-  Renderer renderer(device_, volume.compressed,
-                    GetParam().with({.size = kTiny, .cache_slots = 8, .max_speculation = 2}));
+  DeviceRenderer renderer(device_, volume.compressed,
+                          GetParam().with({.size = kTiny, .cache_slots = 8, .max_speculation = 2}));
   for (const std::size_t stop_after : {1u, 2u}) {
     SCOPED_TRACE(stop_after);
     std::size_t calls = 0;
@@ -426,7 +427,7 @@ TEST_P(InvarianceOnDevice, ProfilingChangesNothing) {
   const TestVolume volume = small_volume();
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
   ocl::Device device(GetParam().device, true);
-  Renderer renderer(device, volume.compressed, GetParam().with({.size = kSmall}));
+  DeviceRenderer renderer(device, volume.compressed, GetParam().with({.size = kSmall}));
   const FrameStats stats = renderer.render({camera, kIsovalue});
   expect_same_hits(renderer.hits(), twin_hits(volume, camera, kSmall, kIsovalue), kSmall.width);
   expect_consistent(stats, renderer.options());

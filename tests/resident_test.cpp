@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/render/renderer.hpp"
+#include "core/render/device_renderer.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/test_devices.hpp"
 
@@ -105,7 +105,7 @@ TEST_P(ResidentOnDevice, EqualsBothPipelines) {
   Resident resident(device_, volume.compressed, kMedium);
   resident.render(camera, 0.3f);
   for (const PipelineKind pipeline : {PipelineKind::kBlocks, PipelineKind::kRays}) {
-    Renderer renderer(device_, volume.compressed, {.size = kMedium, .pipeline = pipeline});
+    DeviceRenderer renderer(device_, volume.compressed, {.size = kMedium, .pipeline = pipeline});
     renderer.render({.camera = camera, .isovalue = 0.3f, .normals = Normals::kCell});
     expect_same_hits(resident.hits(), renderer.hits(), kMedium.width);
   }

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "core/render/renderer.hpp"
+#include "core/render/device_renderer.hpp"
 #include "tests/test_devices.hpp"
 
 namespace isowave::core {

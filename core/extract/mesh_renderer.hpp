@@ -69,11 +69,11 @@ class MeshRenderer {
   /// Waits   yes
   MeshFrameStats render(const Camera &camera, float isovalue, std::optional<ImageSize> size = {});
 
-  /// Returns  the hit buffer of the last frame, as Renderer::hits()
+  /// Returns  the hit buffer of the last frame, as DeviceRenderer::hits()
   /// Throws   Error: no frame was drawn
   /// Waits    yes
   std::vector<HitRecord> hits();
-  /// Returns  the picture of the hit buffer, as Renderer::shade()
+  /// Returns  the picture of the hit buffer, as DeviceRenderer::shade()
   Image8 shade(const Appearance &appearance = {});
 
   /// Forgets the mesh and all decoded blocks, so that the next frame is a cold one: for

@@ -43,7 +43,7 @@ struct RendererOptions {
   std::uint32_t window_blocks = 0;
   bool with_levels = false;        ///< frames may use the volume's levels of detail
   bool with_bounds = false;        ///< frames may draw bounds of the volume
-  bool with_kept_picture = false;  ///< Renderer::keep_picture() will be called
+  bool with_kept_picture = false;  ///< DeviceRenderer::keep_picture() will be called
   bool with_given_rays = false;    ///< frames may have ambient rays, and rays may be cast
   /// Frames are drawn for pictures: else the kernels of smooth normals and of shade() are built
   /// when they are needed.

@@ -131,7 +131,7 @@ const char *name_of(const RayMethod &method) {
 
 /// Milliseconds and completed rays after each pass, of first views from an empty cache. touched:
 /// gets the blocks that each of these passes looked at.
-ordered_json measure_progress(Renderer &renderer, const PaperRun &run, std::size_t count,
+ordered_json measure_progress(DeviceRenderer &renderer, const PaperRun &run, std::size_t count,
                               std::vector<double> &touched) {
   ByPass ms(0), completed(100);
   std::vector<std::vector<double>> times;
@@ -164,7 +164,7 @@ ordered_json measure_progress(Renderer &renderer, const PaperRun &run, std::size
 ordered_json measure_rays(const ocl::DeviceInfo &device_info, const PaperRun &run,
                           const RayMethod &method, const PaperParts &parts) {
   ocl::Device device(device_info);
-  Renderer renderer(device, run.volume, options_of(run, method));
+  DeviceRenderer renderer(device, run.volume, options_of(run, method));
   renderer.render(request_of(run, 0, 0));  // the first frame of all does more
   renderer.clear_cache();
   RayTally tally;
@@ -223,7 +223,7 @@ ordered_json measure_limits(const ocl::DeviceInfo &device_info, const PaperRun &
     RendererOptions options = options_of(run, method);
     options.max_speculation = limit;
     options.on_demand = DecodeOnDemand::kOff;  // on PoCL, rays would have nothing to look ahead for
-    Renderer renderer(device, run.volume, options);
+    DeviceRenderer renderer(device, run.volume, options);
     renderer.render(request_of(run, 0, 0));
     std::vector<double> ms, passes, decoded;
     each_frame(run, [&](std::size_t i, std::size_t view) {
@@ -311,7 +311,7 @@ ordered_json compare_methods(const ocl::DeviceInfo &device_info, const PaperRun 
   std::vector<HitRecord> of_rays, of_mesh;
   {
     ocl::Device device(device_info);
-    Renderer renderer(device, run.volume, options_of(run, {}));
+    DeviceRenderer renderer(device, run.volume, options_of(run, {}));
     renderer.render(request_of(run, 0, 0));
     of_rays = renderer.hits();
     if (!pictures.empty()) write_png(renderer.shade(), pictures + "_rays.png");

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "core/render/renderer.hpp"
+#include "core/render/device_renderer.hpp"
 #include "core/view/camera.hpp"
 
 namespace isowave::core::tools {

@@ -8,7 +8,7 @@
 
 #include "core/base/error.hpp"
 #include "core/io/file_name.hpp"
-#include "core/render/renderer.hpp"
+#include "core/render/device_renderer.hpp"
 #include "reference/stability_suite.hpp"
 #include "reference/watertight.hpp"
 #include "reference/watertight_device.hpp"

@@ -1,4 +1,4 @@
-#include "core/render/renderer.hpp"
+#include "core/render/device_renderer.hpp"
 
 #include <algorithm>
 #include <array>
@@ -67,7 +67,7 @@ LaterPasses later_pass(const PassStats &pass) {
 
 }  // namespace
 
-FrameStats Renderer::render(const FrameRequest &request) {
+FrameStats DeviceRenderer::render(const FrameRequest &request) {
   const auto begin = std::chrono::steady_clock::now();
   const Uploads before = blocks_.uploads();
   const bool is_smooth = request.normals == Normals::kSmooth;
@@ -98,6 +98,7 @@ FrameStats Renderer::render(const FrameRequest &request) {
   const Uploads after = blocks_.uploads();
   stats.uploaded_blocks = after.blocks - before.blocks;
   stats.uploaded_bytes = after.bytes - before.bytes;
+  stats.complete = !stats.cancelled;
   stats.total_ms = ms_since(begin);
   return std::move(stats);
 }
@@ -107,7 +108,7 @@ FrameStats Renderer::render(const FrameRequest &request) {
 ///
 /// next  the wave that follows, if it may begin behind the first pass, without waiting for the
 ///       host. Should this wave need more passes, the next has done nothing.
-void Renderer::run(Wave &wave, Frame &frame, Wave *next) {
+void DeviceRenderer::run(Wave &wave, Frame &frame, Wave *next) {
   if (frame.stats.cancelled) return;
   const auto begin = std::chrono::steady_clock::now();
   const bool in_step = this->in_step(frame.on_pass);
@@ -140,13 +141,13 @@ void Renderer::run(Wave &wave, Frame &frame, Wave *next) {
 
 /// Casts one ambient ray of each hit. Until the next round begins, the picture shows the rounds
 /// before this one.
-void Renderer::cast_round(std::uint32_t round, Frame &frame) {
+void DeviceRenderer::cast_round(std::uint32_t round, Frame &frame) {
   ambient_round_->set_round(round);
   run(*ambient_round_, frame);
 }
 
-Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume,
-                   const RendererOptions &options)
+DeviceRenderer::DeviceRenderer(ocl::Device &device, const CompressedVolume &volume,
+                               const RendererOptions &options)
     : device_(device),
       setup_begin_(std::chrono::steady_clock::now()),
       compile_ms_before_(device.compile_ms()),
@@ -192,7 +193,7 @@ Renderer::Renderer(ocl::Device &device, const CompressedVolume &volume,
 /// themselves run, of a frame of one pixel that meets nothing: what is launched here cannot differ
 /// from what frames launch, and all kernels leave by the exits they have for empty lists. Costs no
 /// time that grows with the volume; all that it leaves is one hit, which every frame clears.
-void Renderer::compile_kernels() {
+void DeviceRenderer::compile_kernels() {
   const auto compiling = device_.compiling();
   Wavefront &rays = rays_;
   rays.frame = FrameParams{};
@@ -222,14 +223,14 @@ void Renderer::compile_kernels() {
 }
 
 /// After a frame that has freed so many slots of its own blocks.
-void Renderer::plan_growth(std::uint64_t recycled) {
+void DeviceRenderer::plan_growth(std::uint64_t recycled) {
   wanted_slots_ = grown_cache_slots(plan_, recycled);
 }
 
 /// Between frames: a cache of wanted_slots_, without a block. What there was is freed first, so
 /// that the plan is kept. Where the device has not so much memory after all, the cache stays as
 /// large as it was, or becomes smaller, and never grows again; pictures do not depend on it.
-void Renderer::grow_cache() {
+void DeviceRenderer::grow_cache() {
   if (wanted_slots_ == plan_.cache_slots) return;
   const std::uint32_t before = plan_.cache_slots;
   for (std::uint32_t slots = wanted_slots_;;) {
@@ -251,30 +252,28 @@ void Renderer::grow_cache() {
   options_.cache_slots = wanted_slots_ = plan_.cache_slots;
 }
 
-/// Throws Error before anything has changed.
-void Renderer::check(const FrameRequest &request) const {
-  const ImageSize size = size_of(request);
-  check_image_size(size);
-  if (size.num_rays() > rays_.num_rays) {
-    throw Error("{}x{} pixels have more than the {} rays that the renderer was made for",
-                size.width, size.height, rays_.num_rays);
-  }
-  check_voxel_pixels(request.voxel_pixels);
-  if (request.voxel_pixels > 0 && !options_.with_levels) {
-    throw Error("a renderer of the finest level alone cannot draw with {} pixels between voxels",
-                request.voxel_pixels);
-  }
-  if (request.bound != FieldBound::kNone && !options_.with_bounds)
-    throw Error("a renderer that was made without bounds cannot draw one");
-  check_ambient_rays(request.ambient_rays);
-  if (request.ambient_rays != 0) check_has_given();
+Abilities DeviceRenderer::abilities_of(const RendererOptions &options) {
+  Abilities abilities;
+  abilities.largest = options.size;
+  abilities.most_rays = options.size.num_rays();
+  abilities.levels = options.with_levels;
+  abilities.fewer_planes = true;
+  abilities.bounds = options.with_bounds;
+  abilities.given_rays = options.with_given_rays;
+  abilities.kept_picture = options.with_kept_picture;
+  abilities.solver = options.solver;
+  return abilities;
 }
 
-void Renderer::begin_frame(const FrameRequest &request) {
-  check(request);
+std::vector<VolumeInfo> DeviceRenderer::levels() const {
+  return infos_of(blocks_.levels);
+}
+
+void DeviceRenderer::begin_frame(const FrameRequest &request) {
+  core::check(request, abilities());
   if (request.ambient_rays != 0 && is_brick())
-    throw Error("a brick's ambient rays go on in other bricks: see BrickRenderer");
-  const ImageSize size = size_of(request);
+    throw Error("a brick's ambient rays go on in other bricks: see TeamRenderer");
+  const ImageSize size = size_of(request, abilities());
   std::vector<FrameParams> frames = make_level_frames(infos_of(blocks_.levels), request.camera,
                                                       size, request.isovalue, request.voxel_pixels);
   const std::vector<DecodedValues> values = decoded_values(request);
@@ -285,14 +284,15 @@ void Renderer::begin_frame(const FrameRequest &request) {
 }
 
 /// Opens a frame with a cache of the slots that are wanted.
-void Renderer::open_frame(std::vector<FrameParams> frames, const std::vector<DecodedValues> &values,
-                          FieldBound bound, RaySource source) {
+void DeviceRenderer::open_frame(std::vector<FrameParams> frames,
+                                const std::vector<DecodedValues> &values, FieldBound bound,
+                                RaySource source) {
   passes_.drain();  // what the frame before had enqueued beyond its last pass
   grow_cache();
   blocks_.open(rays_, std::move(frames), values, bound, source);
 }
 
-PassStats Renderer::stats_of(const PassCounts &counts) {
+PassStats DeviceRenderer::stats_of(const PassCounts &counts) {
   const double rays = static_cast<double>(size_.num_rays());
   PassStats stats;
   stats.counts = counts;
@@ -319,7 +319,7 @@ PassStats Renderer::stats_of(const PassCounts &counts) {
 
 /// What the request makes of each level's blocks. Throws Error where the error is not known that a
 /// bound needs.
-std::vector<DecodedValues> Renderer::decoded_values(const FrameRequest &request) const {
+std::vector<DecodedValues> DeviceRenderer::decoded_values(const FrameRequest &request) const {
   std::vector<DecodedValues> values;
   for (const Level &level : blocks_.levels) {
     const double voxel_error = voxel_error_of(request.voxel_error, values.size());
@@ -336,19 +336,19 @@ std::vector<DecodedValues> Renderer::decoded_values(const FrameRequest &request)
   return values;
 }
 
-std::optional<BlockBox> Renderer::surface_box(std::span<const float> isovalues) {
+std::optional<BlockBox> DeviceRenderer::surface_box(std::span<const float> isovalues) {
   Level &finest = blocks_.levels[0];
   finest.macrocells.use(static_cast<std::size_t>(FieldBound::kNone));
   return isowave::core::surface_box(finest.macrocells, finest.info, isovalues);
 }
 
-Camera Renderer::camera(std::span<const float> isovalues, std::optional<ImageSize> size) {
+Camera DeviceRenderer::camera(std::span<const float> isovalues, std::optional<ImageSize> size) {
   return surface_camera(blocks_.levels[0].info, surface_box(isovalues),
                         size.value_or(options_.size));
 }
 
-std::vector<HitRecord> Renderer::cast_rays(std::span<const WorldRay> world_rays, float isovalue,
-                                           Normals normals) {
+std::vector<HitRecord> DeviceRenderer::cast_rays(std::span<const WorldRay> world_rays,
+                                                 float isovalue, Normals normals) {
   check_has_given();
   if (is_brick()) throw Error("rays of any origin go on in other bricks");
   if (std::isnan(isovalue)) throw Error("the isovalue is NaN: give a number");
@@ -384,8 +384,8 @@ std::vector<HitRecord> Renderer::cast_rays(std::span<const WorldRay> world_rays,
 }
 
 /// Of all levels: the finest draws given rays, seen as a picture of so many.
-std::vector<FrameParams> Renderer::frames_of_rays(std::uint32_t columns, std::uint32_t rows,
-                                                  float isovalue) const {
+std::vector<FrameParams> DeviceRenderer::frames_of_rays(std::uint32_t columns, std::uint32_t rows,
+                                                        float isovalue) const {
   std::vector<FrameParams> frames = make_level_grids(infos_of(blocks_.levels));
   for (FrameParams &frame : frames) {
     frame.view.width = columns;
@@ -399,38 +399,37 @@ std::vector<FrameParams> Renderer::frames_of_rays(std::uint32_t columns, std::ui
   return frames;
 }
 
-void Renderer::check_has_given() const {
-  if (!given_rays_)
-    throw Error("a renderer that was made without given rays has no ambient ones, and casts none");
+void DeviceRenderer::check_has_given() const {
+  if (!given_rays_) throw Error("rays of any origin need a renderer that was made with_rays");
 }
 
-void Renderer::check_has_picture() const {
+void DeviceRenderer::check_has_picture() const {
   if (!has_picture_) throw Error("there is no picture: no frame has been drawn");
 }
 
-std::vector<HitRecord> Renderer::hits() const {
+std::vector<HitRecord> DeviceRenderer::hits() {
   check_has_picture();
   std::vector<HitRecord> hits(size_.num_rays());
   rays_.hits.read(hits);
   return hits;
 }
 
-void Renderer::set_hits(std::span<const HitRecord> hits) {
+void DeviceRenderer::set_hits(std::span<const HitRecord> hits) {
   check_has_picture();
   rays_.hits.write(hits);
 }
 
-Image8 Renderer::shade(const Appearance &appearance) {
+Image8 DeviceRenderer::shade(const Appearance &appearance) {
   check_has_picture();
   return shade_(make_shade_params(blocks_.levels[0].info, appearance), rays_, size_.samples);
 }
 
-std::vector<std::uint32_t> Renderer::shade_packed(const Appearance &appearance) {
+std::vector<std::uint32_t> DeviceRenderer::shade_packed(const Appearance &appearance) {
   check_has_picture();
   return shade_.packed(make_shade_params(blocks_.levels[0].info, appearance), rays_, size_.samples);
 }
 
-OpenCounts Renderer::open() const {
+OpenCounts DeviceRenderer::open() const {
   check_has_picture();
   OpenCounts open{{}, rays_.num_ambient};
   if (open.num_ambient == 0) return open;
@@ -439,7 +438,7 @@ OpenCounts Renderer::open() const {
   return open;
 }
 
-std::vector<HitRecord> Renderer::placed_hits() const {
+std::vector<HitRecord> DeviceRenderer::placed_hits() {
   std::vector<HitRecord> hits = this->hits();
   const bool has_level_ids =
       blocks_.level_frames->size() > 1 || blocks_.level_frames->front().place.begin_z != 0;
@@ -456,8 +455,8 @@ std::vector<HitRecord> Renderer::placed_hits() const {
   return hits;
 }
 
-void Renderer::begin_ambient(const FrameRequest &request, std::vector<HitRecord> placed,
-                             LevelRange levels) {
+void DeviceRenderer::begin_ambient(const FrameRequest &request, std::vector<HitRecord> placed,
+                                   LevelRange levels) {
   check_has_picture();
   check_has_given();
   if (!is_brick()) throw Error("only a brick's frames leave their ambient rays to others");
@@ -476,8 +475,9 @@ void Renderer::begin_ambient(const FrameRequest &request, std::vector<HitRecord>
   open_frame(std::move(frames), decoded_values(request), FieldBound::kNone, RaySource::kGiven);
 }
 
-std::vector<std::uint64_t> Renderer::blocked_rays(std::uint32_t round, std::uint32_t num_rounds,
-                                                  LaterPasses &stats) {
+std::vector<std::uint64_t> DeviceRenderer::blocked_rays(std::uint32_t round,
+                                                        std::uint32_t num_rounds,
+                                                        LaterPasses &stats) {
   rays_.frame = blocks_.level_frames->front();
   ambient_->begin(blocks_.levels[blocks_.drawing.first].info, num_rounds);
   const OnPass never_stops;
@@ -497,32 +497,32 @@ std::vector<std::uint64_t> Renderer::blocked_rays(std::uint32_t round, std::uint
   return blocked;
 }
 
-void Renderer::set_open(const OpenCounts &open) {
+void DeviceRenderer::set_open(const OpenCounts &open) {
   check_has_picture();
   check_has_given();
   rays_.open_counts.write(open.counts);
   rays_.num_ambient = open.num_ambient;
 }
 
-KeptPicture &Renderer::kept() {
+KeptPicture &DeviceRenderer::kept() {
   if (!kept_) throw Error("no picture can be kept: the renderer was made without one");
   return *kept_;
 }
 
-void Renderer::keep_picture() {
+void DeviceRenderer::keep_picture() {
   KeptPicture &into = kept();
   check_has_picture();
   into.keep(rays_, size_);
 }
 
-void Renderer::fill_from_kept() {
+void DeviceRenderer::fill_from_kept() {
   kept().show(rays_, false);
   device_.finish();
 }
 
-void Renderer::enlarge_kept(const FrameRequest &request) {
-  check(request);
-  const ImageSize size = size_of(request);
+void DeviceRenderer::enlarge_kept(const FrameRequest &request) {
+  core::check(request, abilities());
+  const ImageSize size = size_of(request, abilities());
   rays_.frame = make_frame_params(blocks_.levels[0].info, request.camera, size, request.isovalue);
   size_ = size;
   rays_.num_ambient = 0;
@@ -530,7 +530,7 @@ void Renderer::enlarge_kept(const FrameRequest &request) {
   device_.finish();
 }
 
-void Renderer::clear_cache() {
+void DeviceRenderer::clear_cache() {
   blocks_.clear();
   device_.finish();
 }

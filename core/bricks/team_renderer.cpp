@@ -1,16 +1,17 @@
-#include "core/bricks/brick_renderer.hpp"
+#include "core/bricks/team_renderer.hpp"
 
 #include <algorithm>
 #include <array>
 #include <atomic>
 #include <chrono>
 #include <cmath>
-#include <cstring>
 #include <exception>
 #include <utility>
 
 #include "core/base/error.hpp"
 #include "core/base/ms_since.hpp"
+#include "core/bricks/ranks.hpp"
+#include "core/frame/surface_camera.hpp"
 #include "core/view/detail.hpp"
 
 namespace isowave::core {
@@ -25,25 +26,27 @@ RendererOptions options_for(const TeamVolume &volume, RendererOptions options) {
 
 }  // namespace
 
-BrickRenderer::BrickRenderer(ocl::Device &device, const TeamVolume &volume, RendererOptions options,
-                             Team &team)
-    : BrickRenderer(device, volume.brick, options_for(volume, std::move(options)), volume.cuts,
-                    volume.levels, team) {}
+TeamRenderer::TeamRenderer(ocl::Device &device, const TeamVolume &volume, RendererOptions options,
+                           Team &team)
+    : TeamRenderer(device, volume.brick, options_for(volume, std::move(options)), volume.cuts,
+                   volume.levels, team) {}
 
-BrickRenderer::BrickRenderer(ocl::Device &device, const CompressedVolume &volume,
-                             const RendererOptions &options, const Cuts &cuts,
-                             std::vector<VolumeInfo> whole, Team &team)
+TeamRenderer::TeamRenderer(ocl::Device &device, const CompressedVolume &volume,
+                           const RendererOptions &options, const Cuts &cuts,
+                           std::vector<VolumeInfo> whole, Team &team)
     : renderer_(device, volume, options),
+      brick_(volume.info),
       cuts_(cuts),
       whole_levels_(std::move(whole)),
       num_levels_(options.with_levels ? 1 + volume.coarser_levels.size() : 1),
       team_(team) {}
 
-void BrickRenderer::check_levels(const FrameRequest &request) const {
+/// Throws Error if one renderer of the whole would draw with levels that bricks do not have.
+void TeamRenderer::check_levels(const FrameRequest &request) const {
   if (request.voxel_pixels == 0 || num_levels_ == whole_levels_.size()) return;
   const std::vector<FrameParams> frames =
-      make_level_frames(whole_levels_, request.camera, renderer_.size_of(request), request.isovalue,
-                        request.voxel_pixels);
+      make_level_frames(whole_levels_, request.camera, size_of(request, abilities()),
+                        request.isovalue, request.voxel_pixels);
   if (num_levels_ > 1 &&
       std::none_of(frames.begin() + std::ptrdiff_t(num_levels_), frames.end(), draws))
     return;
@@ -53,10 +56,13 @@ void BrickRenderer::check_levels(const FrameRequest &request) const {
       team_.size(), num_levels_, whole_levels_.size(), request.voxel_pixels, num_levels_);
 }
 
-FrameStats BrickRenderer::render(const FrameRequest &request) {
-  const View view = make_view(whole_levels_.front(), request.camera, renderer_.size_of(request));
+FrameStats TeamRenderer::render(const FrameRequest &request) {
+  check(request, abilities());
+  check_levels(request);
+  const View view = make_view(whole_levels_.front(), request.camera, size_of(request, abilities()));
   place_ = cuts_.order_from({view.eye_x, view.eye_y, view.eye_z})[team_.rank()];
   own_hits_.clear();
+  num_hits_.reset();
   has_whole_ = false;
   FrameRequest own = request;
   own.ambient_rays = 0;
@@ -67,11 +73,12 @@ FrameStats BrickRenderer::render(const FrameRequest &request) {
     together(team_, [&] { stats = renderer_.render(own); });
   }
   if (request.ambient_rays != 0 && !stats.cancelled) add_ambient(request, stats);
+  stats.complete = !stats.cancelled;
   return stats;
 }
 
 /// A rank that is through goes on to take part in pictures, until all are.
-FrameStats BrickRenderer::render_in_step(const FrameRequest &request) {
+FrameStats TeamRenderer::render_in_step(const FrameRequest &request) {
   enum State : char { kAtWork, kThrough, kFailed };
   bool all_through = false, one_failed = false, is_stopped = false;
   PassStats last;
@@ -113,27 +120,27 @@ FrameStats BrickRenderer::render_in_step(const FrameRequest &request) {
   return stats;
 }
 
-TimedFrame BrickRenderer::render_within(const FrameRequest &request, double budget_ms) {
-  if (!timed_frames_) {
-    const auto now = [this] {
-      const double ms = TimedFrames::steady_clock_ms();
-      std::string text(sizeof(ms), '\0');
-      std::memcpy(text.data(), &ms, sizeof(ms));
-      double of_rank0 = 0;
-      std::memcpy(&of_rank0, team_.all_gather(text).front().data(), sizeof(of_rank0));
-      return of_rank0;
-    };
-    timed_frames_.emplace(renderer_, now,
-                          [this](const FrameRequest &of_step) { return render(of_step); });
-  }
-  TimedFrame frame = timed_frames_->render(request, budget_ms);
-  if (!has_whole_) own_hits_.clear();  // the kept picture's may fill them
-  return frame;
+Camera TeamRenderer::camera(std::span<const float> isovalues, std::optional<ImageSize> size) {
+  std::optional<BlockBox> own;
+  together(team_, [&] { own = renderer_.surface_box(isovalues); });
+  return surface_camera(whole_levels_.front(), gather_box(team_, brick_, own),
+                        size.value_or(abilities().largest));
+}
+
+/// The kept picture may fill own hits, but not those of all bricks.
+void TeamRenderer::fill_from_kept() {
+  renderer_.fill_from_kept();
+  if (!has_whole_) own_hits_.clear();
+}
+
+void TeamRenderer::enlarge_kept(const FrameRequest &request) {
+  renderer_.enlarge_kept(request);
+  if (!has_whole_) own_hits_.clear();
 }
 
 /// All ranks get the hits that are seen, and each casts their rays through its brick. A ray is open
 /// where it meets nothing in any.
-void BrickRenderer::add_ambient(const FrameRequest &request, FrameStats &stats) {
+void TeamRenderer::add_ambient(const FrameRequest &request, FrameStats &stats) {
   std::vector<HitRecord> placed;
   together(team_, [&] {
     own_hits();
@@ -174,13 +181,13 @@ void BrickRenderer::add_ambient(const FrameRequest &request, FrameStats &stats) 
   }
 }
 
-std::span<const HitRecord> BrickRenderer::own_hits() {
+std::span<const HitRecord> TeamRenderer::own_hits() {
   if (own_hits_.empty()) own_hits_ = renderer_.hits();
   return own_hits_;
 }
 
-void BrickRenderer::reduce(std::size_t count, Reduction how, Receiver who, const MakeWords &make,
-                           const TakeWords &take) {
+void TeamRenderer::reduce(std::size_t count, Reduction how, Receiver who, const MakeWords &make,
+                          const TakeWords &take) {
   const auto begin = std::chrono::steady_clock::now();
   team_.reduce(count, how, who, make, take);
   composition_.ms += ms_since(begin);
@@ -188,7 +195,7 @@ void BrickRenderer::reduce(std::size_t count, Reduction how, Receiver who, const
   composition_.bytes += count * sizeof(std::uint64_t);
 }
 
-void BrickRenderer::compose_colors(std::span<const std::uint32_t> colors, Image8 &image) {
+void TeamRenderer::compose_colors(std::span<const std::uint32_t> colors, Image8 &image) {
   const bool in_halves = team_.size() <= kMostHalfWordBricks;
   const std::size_t per_word = in_halves ? 2 : 1;
   std::atomic<std::uint64_t> num_hits = 0;
@@ -206,7 +213,7 @@ void BrickRenderer::compose_colors(std::span<const std::uint32_t> colors, Image8
   num_hits_ = num_hits;
 }
 
-void BrickRenderer::compose(Receiver who, const MakeWords &make, const TakeWords &take) {
+void TeamRenderer::compose(Receiver who, const MakeWords &make, const TakeWords &take) {
   std::atomic<std::uint64_t> num_hits = 0;
   reduce(renderer_.size().num_rays(), Reduction::kMin, who, make,
          [&](std::size_t begin, std::span<const std::uint64_t> words) {
@@ -217,8 +224,8 @@ void BrickRenderer::compose(Receiver who, const MakeWords &make, const TakeWords
   num_hits_ = num_hits;
 }
 
-std::vector<HitRecord> BrickRenderer::compose_hits(std::span<const HitRecord> own,
-                                                   std::span<const HitField> fields, Receiver who) {
+std::vector<HitRecord> TeamRenderer::compose_hits(std::span<const HitRecord> own,
+                                                  std::span<const HitField> fields, Receiver who) {
   const bool receives = who == Receiver::kAll || team_.rank() == 0;
   std::vector<HitRecord> hits(receives ? own.size() : 0, no_hit());
   for (const HitField field : fields) {
@@ -234,7 +241,7 @@ std::vector<HitRecord> BrickRenderer::compose_hits(std::span<const HitRecord> ow
   return hits;
 }
 
-Image8 BrickRenderer::shade(const Appearance &appearance) {
+Image8 TeamRenderer::shade(const Appearance &appearance) {
   const bool receives = team_.rank() == 0;
   if (has_whole_) return receives ? renderer_.shade(appearance) : Image8{};
   const ImageSize size = renderer_.size();
@@ -256,12 +263,17 @@ Image8 BrickRenderer::shade(const Appearance &appearance) {
   return image;
 }
 
-std::vector<float> BrickRenderer::depth() {
+std::vector<float> TeamRenderer::depth() {
   constexpr HitField kDepth[] = {HitField::kT};
   return depth_of(compose_hits(own_hits(), kDepth));
 }
 
-std::vector<HitRecord> BrickRenderer::hits() {
+std::uint64_t TeamRenderer::num_hits(const FrameStats &) {
+  if (!num_hits_) depth();
+  return num_hits_.value();
+}
+
+std::vector<HitRecord> TeamRenderer::hits() {
   return compose_hits(own_hits(), kHitFields);
 }
 

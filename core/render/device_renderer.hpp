@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/frame/frame_request.hpp"
+#include "core/frame/renderer.hpp"
 #include "core/render/block_store.hpp"
 #include "core/render/memory_plan.hpp"
 #include "core/render/passes.hpp"
@@ -22,13 +22,11 @@
 #include "core/stages/kept_picture.hpp"
 #include "core/stages/shade.hpp"
 #include "core/stages/smooth_normals.hpp"
-#include "core/view/given_rays.hpp"
 #include "core/zfp/zfp_stream.hpp"
 
 namespace isowave::core {
 
-/// Not thread-safe, as the device.
-class Renderer {
+class DeviceRenderer : public Renderer {
  public:
   /// Uploads the volume, builds its macrocell ranges and every buffer of the frame, and has the
   /// kernels compiled; nothing is allocated or compiled later.
@@ -38,7 +36,8 @@ class Renderer {
   /// options  capacities: what no request may exceed
   /// Throws   Error: options out of range, the device's memory or the budget does not suffice
   /// Waits    yes
-  Renderer(ocl::Device &device, const CompressedVolume &volume, const RendererOptions &options);
+  DeviceRenderer(ocl::Device &device, const CompressedVolume &volume,
+                 const RendererOptions &options);
 
   /// Draws one frame. Decoded blocks stay in the cache for the next frame, whatever its isovalue,
   /// unless that asks for other values (voxel_error, bound), or this one needed many more than
@@ -48,10 +47,12 @@ class Renderer {
   /// Throws   Error: a request that is out of range or that the renderer was not made for; a file
   ///          that blocks are read from has become shorter. The next frame is not affected.
   /// Waits    yes
-  FrameStats render(const FrameRequest &request);
+  FrameStats render(const FrameRequest &request) override;
 
-  /// Throws  Error: the renderer was not made for the request's size, levels of detail or bound
-  void check(const FrameRequest &request) const;
+  /// What a renderer with such options can draw.
+  static Abilities abilities_of(const RendererOptions &options);
+  Abilities abilities() const override { return abilities_of(options_); }
+  std::vector<VolumeInfo> levels() const override;
 
   /// The box around the blocks that isosurfaces may be in; none: in no block.
   ///
@@ -59,38 +60,20 @@ class Renderer {
   /// Waits   yes
   std::optional<BlockBox> surface_box(std::span<const float> isovalues);
 
-  /// A view in which isosurfaces fill a picture of that size, see surface_camera(); none: of the
-  /// largest.
-  ///
-  /// Throws  Error: an isovalue is NaN
-  /// Waits   yes
-  Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {});
+  Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {}) override;
+  std::vector<HitRecord> cast_rays(std::span<const WorldRay> rays, float isovalue,
+                                   Normals normals) override;
 
-  /// The first hit of each ray, in the finest level of detail. t counts in lengths of its
-  /// direction. Leaves the picture of the last frame as it is.
-  ///
-  /// isovalue, normals  as in FrameRequest
-  /// Throws  Error: the renderer was made without given rays; what make_index_rays() throws; the
-  ///         isovalue is NaN
-  /// Waits   yes
-  std::vector<HitRecord> cast_rays(std::span<const WorldRay> rays, float isovalue, Normals normals);
-
-  /// Returns  the hit buffer of the last frame [size.ray_rows()][size.ray_columns()], row 0 at the
-  ///          top
-  /// Throws   Error: no frame was drawn
-  /// Waits    yes
-  std::vector<HitRecord> hits() const;
+  std::vector<HitRecord> hits() override;
   /// Puts other hits in the place of the last frame's: what shade() shows.
   ///
   /// hits    [size.ray_rows()][size.ray_columns()]
   /// Throws  Error: no frame was drawn
   /// Waits   yes
   void set_hits(std::span<const HitRecord> hits);
-  /// Returns  the picture of the hit buffer, RGB [size.height][size.width], row 0 at the top
-  /// Throws   Error: no frame was drawn
-  /// Waits    yes
-  Image8 shade(const Appearance &appearance = {});
-  /// The same, RGBA in words, red in bits 0..7: A is 0 where no ray of a pixel hits.
+  Image8 shade(const Appearance &appearance = {}) override;
+  /// The picture of the hit buffer, RGBA in words, red in bits 0..7: A is 0 where no ray of a pixel
+  /// hits.
   std::vector<std::uint32_t> shade_packed(const Appearance &appearance);
   /// How open the hits of the last frame are, as far as its ambient rays are through.
   ///
@@ -102,7 +85,7 @@ class Renderer {
   // ambient rays, since these go on in others.
 
   /// hits() as all bricks can read them, of any level of detail: see placed_hit().
-  std::vector<HitRecord> placed_hits() const;
+  std::vector<HitRecord> placed_hits();
   /// Begins the rounds of ambient rays of a frame that was drawn last and is not cancelled. They
   /// leave the placed hits of all bricks, in the place of the brick's own.
   ///
@@ -121,42 +104,21 @@ class Renderer {
   /// What shade() takes for open(). Waits.
   void set_open(const OpenCounts &open);
 
-  // For pictures of one frame with more and more pixels (core/render/time_budget.hpp). Without
-  // options().with_kept_picture these three throw Error.
+  /// These three throw Error without options().with_kept_picture.
+  void keep_picture() override;
+  void fill_from_kept() override;
+  void enlarge_kept(const FrameRequest &request) override;
 
-  /// Puts the last frame's picture aside: of at most half the pixels that the renderer was made
-  /// for, along each axis, rounded up (halved()).
-  void keep_picture();
-  /// Where the last frame has no hit, it shows the kept picture's, as after rendering was
-  /// cancelled.
-  ///
-  /// Waits  yes
-  void fill_from_kept();
-  /// The kept picture, of the same request, becomes the last frame's with as many pixels as the
-  /// request says.
-  ///
-  /// Waits  yes
-  void enlarge_kept(const FrameRequest &request);
+  void clear_cache() override;
 
-  /// Forgets all decoded blocks, so that the next frame is a cold one: for measurements. No picture
-  /// depends on it.
-  ///
-  /// Waits  yes
-  void clear_cache();
-
-  ImageSize size() const { return size_; }  ///< of the last frame's picture, or the one at work
-  /// The size of the request's picture.
-  ImageSize size_of(const FrameRequest &request) const {
-    return request.size.value_or(options_.size);
-  }
+  ImageSize size() const override { return size_; }
+  std::uint64_t memory_bytes() const override { return plan_.total(); }
   const RendererOptions &options() const { return options_; }  ///< with the defaults filled in
   const MemoryPlan &memory_plan() const { return plan_; }      ///< every buffer that there is
-  const Macrocells &macrocells() const {
-    return blocks_.levels[0].macrocells;
-  }  ///< of the finest level
-  double setup_ms() const {
-    return setup_ms_;
-  }  ///< upload, macrocell ranges; without Device::compile_ms()
+  /// The finest level's.
+  const Macrocells &macrocells() const { return blocks_.levels[0].macrocells; }
+  /// Upload and macrocell ranges, without Device::compile_ms().
+  double setup_ms() const override { return setup_ms_; }
 
  private:
   /// The frame at work.
