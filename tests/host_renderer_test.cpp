@@ -15,9 +15,9 @@
 #include <thread>
 
 #include "core/base/error.hpp"
-#include "core/base/host_memory.hpp"
 #include "core/host/host_renderer.hpp"
 #include "core/io/open_volume.hpp"
+#include "core/platform/memory.hpp"
 #include "core/render/device_renderer.hpp"
 #include "core/stages/ambient.hpp"
 #include "reference/random.hpp"
@@ -402,7 +402,7 @@ TEST(HostRenderer, MemoryIsStatedAndLimited) {
   // 9 x 6 x 5 blocks with two bytes of state; 3 x 2 x 2 macrocells of 64 ranges, one of their own
   // and a mask; a byte for each page of 64 float32 and of a word of 64 bits a block; 256
   // thresholds. One ray at a time needs eight blocks and their cells that change.
-  const std::uint64_t page = ReservedMemory::page_bytes(), blocks = 9 * 6 * 5;
+  const std::uint64_t page = platform::page_bytes(), blocks = 9 * 6 * 5;
   const std::uint64_t bytes = 2 * blocks + 3 * 2 * 2 * (65 * 8 + 8) +
                               (256 * blocks + page - 1) / page + (8 * blocks + page - 1) / page +
                               256 * 4;
@@ -414,7 +414,7 @@ TEST(HostRenderer, MemoryIsStatedAndLimited) {
   CompressedVolume huge;
   huge.info = test::grid_info(glm::uvec3(65'536, 65'536, 1'000));
   EXPECT_THAT(error_of([&] { HostRenderer{huge}; }),
-              HasSubstr(fmt::format("{} MiB are allowed", host_memory() / 4 >> 20)));
+              HasSubstr(fmt::format("{} MiB are allowed", platform::host_memory() / 4 >> 20)));
   // Whole pages of what frames decode come on top.
   HostRenderer free(volume.compressed);
   free.render({orbit_cameras(volume.info(), 1)[0], 0.2f, kOdd});
@@ -442,7 +442,7 @@ TEST(HostRenderer, AnyLimitGivesTheSameBits) {
   for (const std::uint64_t pages : {0, 5, 50}) {
     for (const std::uint32_t threads : {1, 2}) {
       SCOPED_TRACE(fmt::format("{} pages more, {} threads", pages, threads));
-      const std::uint64_t limit = least + pages * ReservedMemory::page_bytes();
+      const std::uint64_t limit = least + pages * platform::page_bytes();
       HostRenderer renderer(volume.compressed, {.memory_limit = limit, .num_threads = threads});
       for (const bool is_watched : {false, true}) {
         if (is_watched)

@@ -6,11 +6,11 @@
 #include <cmath>
 
 #include "core/base/error.hpp"
-#include "core/base/host_memory.hpp"
 #include "core/base/ms_since.hpp"
 #include "core/base/parallel_for.hpp"
 #include "core/frame/ambient_rays.hpp"
 #include "core/frame/surface_camera.hpp"
+#include "core/platform/memory.hpp"
 #include "core/view/detail.hpp"
 #include "kernels_cl/portable/cell_intersect.h"
 
@@ -32,7 +32,8 @@ std::uint64_t mebibytes(std::uint64_t bytes) {
 /// The memory limit, if the volume can be drawn within it.
 std::uint64_t checked_limit(const VolumeInfo &info, const HostRendererOptions &options) {
   const std::uint64_t needed = HostBlocks::least_bytes(info),
-                      limit = options.memory_limit != 0 ? options.memory_limit : host_memory() / 4;
+                      limit = options.memory_limit != 0 ? options.memory_limit
+                                                        : platform::host_memory() / 4;
   if (needed <= limit) return limit;
   throw Error(
       "drawing on the host takes {} MiB of memory at least, for value ranges of all blocks, and {} "

@@ -37,10 +37,10 @@
 #include <random>
 
 #include "core/base/error.hpp"
-#include "core/base/names_in.hpp"
 #include "core/base/text.hpp"
 #include "core/io/file_name.hpp"
 #include "core/io/input_file.hpp"
+#include "core/platform/names_in.hpp"
 #include "tools/isowave/bench_paper_runs.hpp"
 #include "tools/isowave/frame_options.hpp"
 #include "tools/isowave/outputs.hpp"
@@ -107,7 +107,7 @@ FoundVolumes find_volumes(const std::vector<std::string> &inputs, const RawOverr
       continue;
     }
     std::vector<std::string> names;
-    for (const std::string &name : names_in(input)) {
+    for (const std::string &name : platform::names_in(input)) {
       const fs::path file = fs::path(input) / name;
       if (fs::is_regular_file(file, error) && is_volume_name(file)) names.push_back(file.string());
     }

@@ -1,4 +1,4 @@
-#include "core/base/private_folder.hpp"
+#include "core/platform/private_folder.hpp"
 
 #include <fmt/format.h>
 #include <sys/stat.h>
@@ -13,9 +13,9 @@
 #include <optional>
 #include <system_error>
 
-#include "core/base/names_in.hpp"
+#include "core/platform/names_in.hpp"
 
-namespace isowave::core {
+namespace isowave::core::platform {
 
 namespace fs = std::filesystem;
 
@@ -192,4 +192,4 @@ fs::path make_private(const fs::path &parent, const std::string &name) {
   return {};
 }
 
-}  // namespace isowave::core
+}  // namespace isowave::core::platform

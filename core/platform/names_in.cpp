@@ -1,10 +1,10 @@
-#include "core/base/names_in.hpp"
+#include "core/platform/names_in.hpp"
 
 #include <dirent.h>
 
 #include <memory>
 
-namespace isowave::core {
+namespace isowave::core::platform {
 
 std::vector<std::string> names_in(const std::filesystem::path &folder) {
   const auto close = [](DIR *open) { ::closedir(open); };
@@ -17,4 +17,4 @@ std::vector<std::string> names_in(const std::filesystem::path &folder) {
   return names;
 }
 
-}  // namespace isowave::core
+}  // namespace isowave::core::platform

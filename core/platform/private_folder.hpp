@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <string>
 
-namespace isowave::core {
+namespace isowave::core::platform {
 
 struct FolderCheck {
   std::filesystem::path path;  ///< the folder: absolute, without symbolic links
@@ -30,4 +30,4 @@ FolderCheck check_private(const std::filesystem::path &folder);
 /// Returns  its path, or an empty one if `parent` allows no private folder
 std::filesystem::path make_private(const std::filesystem::path &parent, const std::string &name);
 
-}  // namespace isowave::core
+}  // namespace isowave::core::platform
