@@ -51,10 +51,10 @@ std::vector<double> measure_views(Side &side, float previous, float isovalue,
 class RendererSide : public PeerSide {
  public:
   RendererSide(const CompressedVolume &volume, const Camera &camera, ImageSize size,
-               PipelineKind pipeline, const std::string &device)
+               PipelinePtr pipeline, const std::string &device)
       : camera_(camera),
         device_(ocl::choose_device(device)),
-        renderer_(device_, volume, {.size = size, .pipeline = pipeline}) {}
+        renderer_(device_, volume, {.size = size, .pipeline = std::move(pipeline)}) {}
 
   Measured draw(float isovalue) override {
     Measured measured = measure(*this, camera_, previous_, isovalue);
@@ -122,9 +122,9 @@ std::unique_ptr<PeerSide> make_host_side(CompressedVolume volume, const Camera &
 }
 
 std::unique_ptr<PeerSide> make_renderer_side(CompressedVolume volume, const Camera &camera,
-                                             ImageSize size, PipelineKind pipeline,
+                                             ImageSize size, PipelinePtr pipeline,
                                              const std::string &device) {
-  return std::make_unique<RendererSide>(volume, camera, size, pipeline, device);
+  return std::make_unique<RendererSide>(volume, camera, size, std::move(pipeline), device);
 }
 
 }  // namespace isowave::core::bench

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <set>
 
+#include "core/paper/blocks_pipeline.hpp"
 #include "core/render/renderer.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/stage_support.hpp"
@@ -59,7 +60,7 @@ class FrameCacheOnDevice : public testing::TestWithParam<PipelineOnDevice> {
                                          const std::vector<Camera> &cameras) {
     Renderer ample(device_, volume.compressed,
                    {.size = size,
-                    .pipeline = PipelineKind::kBlocks,
+                    .pipeline = blocks_pipeline(),
                     .cache_slots = static_cast<std::uint32_t>(volume.compressed.block_count()),
                     .max_speculation = 1});
     std::vector<std::uint32_t> counts;
