@@ -82,8 +82,7 @@ std::vector<std::uint64_t> geometric_budgets(const ocl::DeviceInfo &device_info,
   ocl::Device device(device_info);
   const DeviceRenderer ample(device, volume, options);
   const RendererOptions &chosen = ample.options();
-  MemoryRequest request{chosen.size.num_rays(), chosen.pipeline, chosen.grouping,
-                        chosen.group_size};
+  MemoryRequest request{chosen.size.num_rays(), chosen.pipeline, chosen.group_size};
   std::uint64_t least = std::numeric_limits<std::uint64_t>::max();
   for (const StreamPlace place : {StreamPlace::kDevice, StreamPlace::kHost}) {
     if (options.stream != StreamPlace::kAuto && options.stream != place) continue;

@@ -4,7 +4,7 @@
 #include <glm/gtc/quaternion.hpp>
 
 #include "core/base/error.hpp"
-#include "core/stages/resident.hpp"
+#include "core/paper/resident.hpp"
 
 namespace isowave::core::bench {
 

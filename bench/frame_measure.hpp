@@ -35,7 +35,7 @@ std::vector<ViewTimes> measure_views(DeviceRenderer &renderer, const std::vector
 
 double num_passes(const FrameStats &frame);
 
-/// Whole volume decoded, one kernel (core/stages/resident.hpp).
+/// Whole volume decoded, one kernel (core/paper/resident.hpp).
 struct FloorTimes {
   std::vector<std::vector<double>> ms;  ///< [views][rounds]; empty if not measured
   std::string why_not;                  ///< one line, if not measured

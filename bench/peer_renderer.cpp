@@ -17,12 +17,12 @@ namespace {
 class RendererSide : public PeerSide {
  public:
   /// On a device.
-  RendererSide(CompressedVolume volume, const Camera &camera, ImageSize size, PipelineKind pipeline,
+  RendererSide(CompressedVolume volume, const Camera &camera, ImageSize size, PipelinePtr pipeline,
                const std::string &device)
       : volume_(std::move(volume)), camera_(camera), size_(size) {
     device_.emplace(ocl::choose_device(device));
     renderer_ = std::make_unique<DeviceRenderer>(
-        *device_, volume_, RendererOptions{.size = size, .pipeline = pipeline});
+        *device_, volume_, RendererOptions{.size = size, .pipeline = std::move(pipeline)});
   }
   /// On the host.
   RendererSide(CompressedVolume volume, const Camera &camera, ImageSize size)
@@ -92,9 +92,9 @@ std::unique_ptr<PeerSide> make_host_side(CompressedVolume volume, const Camera &
 }
 
 std::unique_ptr<PeerSide> make_renderer_side(CompressedVolume volume, const Camera &camera,
-                                             ImageSize size, PipelineKind pipeline,
+                                             ImageSize size, PipelinePtr pipeline,
                                              const std::string &device) {
-  return std::make_unique<RendererSide>(std::move(volume), camera, size, pipeline, device);
+  return std::make_unique<RendererSide>(std::move(volume), camera, size, std::move(pipeline), device);
 }
 
 }  // namespace isowave::core::bench

@@ -145,7 +145,7 @@ void judge_view(const GridLevels &levels, const RandomView &view,
 
 }  // namespace
 
-std::vector<WatertightResult> run_watertight_on(ocl::Device &device, PipelineKind pipeline,
+std::vector<WatertightResult> run_watertight_on(ocl::Device &device, const PipelinePtr &pipeline,
                                                 std::uint64_t num_rays, std::uint32_t seed,
                                                 Solver solver, RayBands bands, RayPackets packets) {
   const bool with_levels = bands == RayBands::kLevels;

@@ -3,6 +3,7 @@
 
 #include "core/view/detail.hpp"
 #include "core/io/open_volume.hpp"
+#include "core/paper/blocks_pipeline.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -438,7 +439,7 @@ TEST_P(LevelsOnDevice, RefusesWhatItCannotDraw) {
   EXPECT_THAT(
       [&] {
         DeviceRenderer(device_, volume,
-                       {.size = kSmall, .pipeline = PipelineKind::kBlocks, .with_levels = true});
+                 {.size = kSmall, .pipeline = blocks_pipeline(), .with_levels = true});
       },
       ThrowsMessage<Error>(HasSubstr("pipeline blocks")));
   DeviceRenderer renderer(device_, volume, {.size = kSmall, .with_levels = true});

@@ -81,8 +81,7 @@ TEST_P(MemoryPlanOnDevice, BudgetsAreKept) {
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
   const auto expected = test::twin_hits(volume, camera, size_, kIsovalue);
   for (const StreamPlace place : {StreamPlace::kDevice, StreamPlace::kHost}) {
-    const MemoryRequest request{size_.num_pixels(), GetParam().pipeline, GetParam().grouping, 64,
-                                place};
+    const MemoryRequest request{size_.num_pixels(), GetParam().pipeline, 64, place};
     const std::uint64_t least = plan_memory(volume.compressed, request, kMinCacheSlots).peak();
     std::uint32_t last_slots = 0;
     for (const std::uint64_t budget : {least, least + 10'000, least + 50'000, least + 1'000'000}) {
@@ -117,8 +116,7 @@ TEST_P(MemoryPlanOnDevice, TheStreamMovesToTheHostWhereTheBudgetIsTight) {
   const std::uint64_t stream_bytes = volume.compressed.word_count() * sizeof(uint);
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
   const auto expected = test::twin_hits(volume, camera, size_, kIsovalue);
-  const MemoryRequest request{size_.num_pixels(), GetParam().pipeline, GetParam().grouping, 64,
-                              StreamPlace::kHost};
+  const MemoryRequest request{size_.num_pixels(), GetParam().pipeline, 64, StreamPlace::kHost};
   const std::uint64_t least = plan_memory(volume.compressed, request, kMinCacheSlots).peak();
   EXPECT_LT(least, stream_bytes) << "else this scene tests nothing";
   std::vector<StreamPlace> places;
@@ -153,7 +151,7 @@ TEST_P(MemoryPlanOnDevice, TheStreamMovesToTheHostWhereTheBudgetIsTight) {
 /// never left.
 TEST_P(MemoryPlanOnDevice, SmallPlacesOfTheStreamWithSlotsAskedFor) {
   const TestVolume volume({17, 18, 19}, test::noise_field(3), 32);
-  MemoryRequest request{size_.num_pixels(), GetParam().pipeline, GetParam().grouping, 64};
+  MemoryRequest request{size_.num_pixels(), GetParam().pipeline, 64};
   const auto plan_of = [&](std::uint64_t budget, std::uint32_t slots) {
     return plan_with_slots(volume.compressed, request, budget, slots);
   };
@@ -177,7 +175,7 @@ TEST_P(MemoryPlanOnDevice, SmallPlacesOfTheStreamWithSlotsAskedFor) {
 
 TEST_P(MemoryPlanOnDevice, SmallBudgetsTooSmallAreRefusedWithTheOneThatWouldDo) {
   const TestVolume volume({9, 10, 11}, test::noise_field(3), 8);
-  const MemoryRequest request{size_.num_pixels(), GetParam().pipeline, GetParam().grouping, 64};
+  const MemoryRequest request{size_.num_pixels(), GetParam().pipeline, 64};
   const std::uint64_t least = plan_memory(volume.compressed, request, kMinCacheSlots).peak();
   ocl::Device device(GetParam().device);
   const auto render_within = [&](std::uint64_t budget, std::uint32_t slots) {
@@ -301,16 +299,13 @@ TEST_P(MemoryPlanOfLevelsOnDevice, GrownPlansArePlans) {
                      test::sample({40, 41, 42}, test::noise_field(3)));
   const CompressedVolume volume = compress(reader, CompressOptions{.rate = 8, .levels = 2});
   for (const StreamPlace place : {StreamPlace::kDevice, StreamPlace::kHost}) {
-    for (const auto &[pipeline, grouping, levels] :
-         {std::tuple(PipelineKind::kRays, Grouping::kCounting, true),
-          {PipelineKind::kBlocks, Grouping::kCounting, false},
-          {PipelineKind::kBlocks, Grouping::kRadix, false}}) {
+    for (const PipelinePtr &pipeline :
+         {rays_pipeline(), blocks_pipeline(), blocks_pipeline({.grouping = Grouping::kRadix})}) {
       const MemoryRequest request{.num_rays = 500,
                                   .pipeline = pipeline,
-                                  .grouping = grouping,
                                   .stream = place,
                                   .window_blocks = 8,
-                                  .with_levels = levels};
+                                  .with_levels = pipeline->has_levels()};
       const MemoryPlan grown = resized(plan_memory(volume, request, 20), 300),
                        planned = plan_memory(volume, request, 300);
       EXPECT_EQ(grown.cache_slots, planned.cache_slots);

@@ -1,7 +1,7 @@
-// core/extract/mesh_renderer: its hits have the bits of the twin, with any budget; they are those
+// core/paper/mesh_renderer: its hits have the bits of the twin, with any budget; they are those
 // of the ray pipelines as far as triangles can be the trilinear surface.
 
-#include "core/extract/mesh_renderer.hpp"
+#include "core/paper/mesh_renderer.hpp"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>

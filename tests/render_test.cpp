@@ -9,6 +9,7 @@
 
 #include "core/base/error.hpp"
 #include "core/io/open_volume.hpp"
+#include "core/paper/blocks_pipeline.hpp"
 #include "core/render/device_renderer.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/test_devices.hpp"
@@ -106,7 +107,7 @@ TEST_P(RenderOnDevice, SmallLaunchesOfFewRays) {
   EXPECT_GT(check(volume, cameras, {0.1f}, kSmall, {.packets = RayPackets::kOff}), 20u);
   for (const bool scanned : {false, true}) {
     EXPECT_GT(check(volume, cameras, {0.1f}, kSmall,
-                    {.pipeline = PipelineKind::kBlocks, .scanned_pairs = scanned}),
+                    {.pipeline = blocks_pipeline({.scanned_pairs = scanned})}),
               20u);
   }
 }
@@ -115,7 +116,7 @@ TEST_P(RenderOnDevice, SmallGroupsOfTwo) {
   if (is_llvmpipe(GetParam()) && !long_tests()) return;  // it compiles march for minutes, again
   pretend([](ocl::Capabilities &can) { can.max_work_group_size = 3; });
   const TestVolume volume({9, 10, 11}, test::gyroid_field(7));
-  for (const PipelineKind pipeline : {PipelineKind::kRays, PipelineKind::kBlocks}) {
+  for (const PipelinePtr &pipeline : {rays_pipeline(), blocks_pipeline()}) {
     EXPECT_GT(check(volume, {orbit_cameras(volume.info(), 1)[0]}, {0.1f}, small_size(),
                     {.pipeline = pipeline, .packets = RayPackets::kOff}),
               5u);

@@ -10,7 +10,6 @@
 #include "core/base/error.hpp"
 #include "core/base/ms_since.hpp"
 #include "core/ocl/in_process.hpp"
-#include "core/render/blocks_wave.hpp"
 #include "core/render/stall_guard.hpp"
 #include "core/render/surface_camera.hpp"
 #include "core/view/detail.hpp"
@@ -157,19 +156,12 @@ DeviceRenderer::DeviceRenderer(ocl::Device &device, const CompressedVolume &volu
       rays_(device, plan_.limits.rays),
       value_range_(volume.value_range),
       size_(options_.size),
+      camera_rays_(options_.pipeline->make_wave(blocks_, rays_, plan_.limits.wave, options_)),
       smooth_normals_(device, rays_.num_rays, options_.group_size, blocks_.levels.size() > 1),
       normals_of_camera_(blocks_, rays_, smooth_normals_, RaySource::kCamera),
       normals_of_given_(blocks_, rays_, smooth_normals_, RaySource::kGiven),
       shade_(device, options_.size.num_rays()),
       passes_(device, rays_) {
-  if (options_.pipeline == PipelineKind::kBlocks) {
-    camera_rays_ = std::make_unique<BlocksWave>(blocks_, rays_, plan_.limits.pairs, options_.solver,
-                                                options_.closest);
-  } else {
-    camera_rays_ =
-        std::make_unique<RaysWave>(blocks_, rays_, plan_.limits.pairs.group_size, options_.solver,
-                                   RaySource::kCamera, options_.packets, options_.on_demand);
-  }
   if (plan_.limits.kept_rays != 0) kept_.emplace(device, plan_.limits.kept_rays);
   if (options_.with_given_rays) {
     given_rays_.emplace(blocks_, rays_, options_.group_size, options_.solver, RaySource::kGiven);
@@ -199,7 +191,6 @@ void DeviceRenderer::compile_kernels() {
   rays.frame = FrameParams{};
   rays.frame.view.width = rays.frame.view.height = rays.frame.schedule.max_spec_count = 1;
   rays.frame.schedule.table_groups = blocks_.cache.table_groups;
-  rays.frame.schedule.scanned_pairs = options_.scanned_pairs;
   // Frames of one level of detail and of several have kernels of their own.
   for (std::uint32_t num_levels = 1; num_levels <= std::min<std::size_t>(2, blocks_.levels.size());
        ++num_levels) {
@@ -297,12 +288,7 @@ PassStats DeviceRenderer::stats_of(const PassCounts &counts) {
   PassStats stats;
   stats.counts = counts;
   stats.counts.window_count = rays_in_window(counts.window_count, counts.active_count);
-  const bool is_blocks = options_.pipeline == PipelineKind::kBlocks;
-  // Pipeline `rays` looks ahead at the end of a pass, for the rays that are left.
-  const uint rays_looking = rays_in_window(
-      counts.window_count, is_blocks ? counts.active_count : counts.next_active_count);
-  if (rays_looking != 0) stats.n_spec = static_cast<double>(counts.ahead_count) / rays_looking;
-  if (is_blocks) stats.visible_blocks = counts.visible_count;
+  camera_rays_->describe(stats);
   // A launch that is not needed costs more than a pass that finds slots missing now and then. The
   // counts are a pass old: its requests have taken slots since, and the pass after it may have
   // asked for as many.

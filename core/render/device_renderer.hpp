@@ -2,7 +2,7 @@
 // Draws isosurfaces of one compressed volume on one device: the main loop of the program.
 //
 // A frame is a row of waves: camera rays, hits that get smooth normals, rounds of ambient rays.
-// run() has the only loop over passes. Waves: ray_waves.hpp, blocks_wave.hpp.
+// run() has the only loop over passes. Waves: ray_waves.hpp, core/paper.
 
 #include <array>
 #include <chrono>

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "core/paper/blocks_pipeline.hpp"
 #include "core/render/device_renderer.hpp"
 #include "tools/isowave/volume_options.hpp"
 

@@ -1,4 +1,4 @@
-#include "core/stages/resident.hpp"
+#include "core/paper/resident.hpp"
 
 #include <fmt/format.h>
 

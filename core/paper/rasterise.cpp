@@ -1,4 +1,4 @@
-#include "core/stages/rasterise.hpp"
+#include "core/paper/rasterise.hpp"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "core/stages/intersect.hpp"
+#include "core/paper/intersect.hpp"
 
 #include "core/stages/solver_defines.hpp"
 

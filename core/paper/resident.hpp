@@ -1,6 +1,6 @@
 #pragma once
 // The floor that benchmarks compare with: the whole volume decoded in device memory, a frame in one
-// launch. The picture is the pipelines', bit for bit; see kernels_cl/resident.cl.
+// launch. The picture is the pipelines', bit for bit; see kernels_cl/paper/resident.cl.
 
 #include <optional>
 #include <string>

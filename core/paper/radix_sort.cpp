@@ -1,4 +1,4 @@
-#include "core/stages/radix_sort.hpp"
+#include "core/paper/radix_sort.hpp"
 
 #include <fmt/format.h>
 

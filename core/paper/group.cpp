@@ -1,4 +1,4 @@
-#include "core/stages/group.hpp"
+#include "core/paper/group.hpp"
 
 #include <algorithm>
 #include <bit>

@@ -17,9 +17,9 @@
 #include <vector>
 
 #include "core/extract/surface_blocks.hpp"
-#include "core/stages/block_triangles.hpp"
+#include "core/paper/block_triangles.hpp"
+#include "core/paper/rasterise.hpp"
 #include "core/stages/prefix_sum.hpp"
-#include "core/stages/rasterise.hpp"
 #include "core/stages/shade.hpp"
 #include "core/view/camera.hpp"
 

@@ -3,8 +3,9 @@
 // (Sec. 4.4).
 
 #include "core/ocl/kernel.hpp"
+#include "core/paper/closest_hit.hpp"
+#include "core/paper/scan.hpp"
 #include "core/stages/block_cache.hpp"
-#include "core/stages/scan.hpp"
 #include "core/stages/wavefront.hpp"
 
 namespace isowave::core {

@@ -1,4 +1,4 @@
-#include "core/stages/initial_rays.hpp"
+#include "core/paper/initial_rays.hpp"
 
 #include <utility>
 

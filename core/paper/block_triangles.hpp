@@ -1,6 +1,6 @@
 #pragma once
 // Listed blocks whose values are cached -> triangles with vertices of their own, for drawing
-// (kernels_cl/block_triangles.cl).
+// (kernels_cl/paper/block_triangles.cl).
 
 #include "core/ocl/kernel.hpp"
 #include "core/stages/block_cache.hpp"

@@ -4,8 +4,8 @@
 #include <optional>
 
 #include "core/ocl/kernel.hpp"
+#include "core/paper/scan.hpp"
 #include "core/stages/macrocells.hpp"
-#include "core/stages/scan.hpp"
 #include "core/stages/wavefront.hpp"
 
 namespace isowave::core {

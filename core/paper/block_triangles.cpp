@@ -1,4 +1,4 @@
-#include "core/stages/block_triangles.hpp"
+#include "core/paper/block_triangles.hpp"
 
 #include "core/stages/cell_triangles.hpp"
 

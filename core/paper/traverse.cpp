@@ -1,4 +1,4 @@
-#include "core/stages/traverse.hpp"
+#include "core/paper/traverse.hpp"
 
 namespace isowave::core {
 

@@ -5,8 +5,9 @@
 #include <variant>
 
 #include "core/ocl/kernel.hpp"
+#include "core/paper/closest_hit.hpp"
+#include "core/paper/radix_sort.hpp"
 #include "core/stages/block_cache.hpp"
-#include "core/stages/radix_sort.hpp"
 #include "core/stages/wavefront.hpp"
 
 namespace isowave::core {

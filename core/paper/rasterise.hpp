@@ -1,6 +1,6 @@
 #pragma once
-// Triangles -> hit buffer (kernels_cl/rasterise.cl): what Block-Compressed Marching Cubes has drawn
-// by the graphics pipeline, as OpenCL kernels, with the same bits on every device.
+// Triangles -> hit buffer (kernels_cl/paper/rasterise.cl): what Block-Compressed Marching Cubes has
+// drawn by the graphics pipeline, as OpenCL kernels, with the same bits on every device.
 
 #include "core/ocl/kernel.hpp"
 #include "core/stages/wavefront.hpp"

@@ -5,7 +5,7 @@
 
 #include "core/frame/solvers.hpp"
 #include "core/ocl/kernel.hpp"
-#include "core/stages/group.hpp"
+#include "core/paper/group.hpp"
 #include "core/stages/wavefront.hpp"
 
 namespace isowave::core {

@@ -2,7 +2,7 @@
 // Camera -> the first block of every pixel's ray and the first wavefront (Sec. 3.2).
 
 #include "core/ocl/kernel.hpp"
-#include "core/stages/scan.hpp"
+#include "core/paper/scan.hpp"
 #include "core/stages/wavefront.hpp"
 
 namespace isowave::core {

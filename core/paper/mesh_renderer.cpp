@@ -1,4 +1,4 @@
-#include "core/extract/mesh_renderer.hpp"
+#include "core/paper/mesh_renderer.hpp"
 
 #include <algorithm>
 #include <array>
@@ -21,7 +21,7 @@ constexpr std::uint64_t kMostTriangles = std::numeric_limits<std::uint32_t>::max
 constexpr std::uint32_t kBlocksThatSum =
     std::numeric_limits<std::uint32_t>::max() / kBlockTriangles;
 /// Blocks written by a launch, which watchdogs would end if it took long.
-constexpr std::uint32_t kBlocksPerLaunch = 1u << 20;
+constexpr std::uint32_t kWrittenPerLaunch = 1u << 20;
 
 std::uint64_t vertex_bytes(std::uint64_t num_triangles) {
   return ocl::buffer_size<BlockVertex>("", 3 * num_triangles).bytes();
@@ -165,8 +165,8 @@ void MeshRenderer::make_mesh(std::uint64_t num_triangles) {
     mesh_.emplace(device_, ocl::buffer_size<BlockVertex>("mesh vertices", 3 * num_triangles));
   }
   const auto stage = device_.timer().stage("surface");
-  for (std::uint32_t begin = 0; begin < num_listed_; begin += kBlocksPerLaunch) {
-    const std::uint32_t end = begin + std::min(kBlocksPerLaunch, num_listed_ - begin);
+  for (std::uint32_t begin = 0; begin < num_listed_; begin += kWrittenPerLaunch) {
+    const std::uint32_t end = begin + std::min(kWrittenPerLaunch, num_listed_ - begin);
     block_triangles_.write(blocks_.frame(), blocks_.cache(), lists_->block_ids, {begin, end, 0},
                            lists_->offsets, 0, *mesh_, blocks_.stream().no_data());
   }

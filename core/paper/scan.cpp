@@ -1,4 +1,4 @@
-#include "core/stages/scan.hpp"
+#include "core/paper/scan.hpp"
 
 #include <algorithm>
 
