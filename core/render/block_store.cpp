@@ -68,7 +68,23 @@ std::vector<Level> make_levels(ocl::Device &device, const CompressedVolume &volu
   return levels;
 }
 
+std::vector<Level> make_level(ocl::Device &device, const CompressedVolume &volume,
+                              DeviceStream stream, const BlockCache::Limits &limits) {
+  Macrocells macrocells(device, make_grid_params(volume.info), stream);
+  ZfpDecode decode(device, limits.max_requests(), stream.defines());
+  std::vector<Level> levels;
+  levels.push_back({volume.info, volume.precision, LevelError(volume, true), std::move(stream),
+                    std::move(macrocells), std::move(decode)});
+  return levels;
+}
+
 }  // namespace
+
+BlockStore::BlockStore(ocl::Device &of, const CompressedVolume &volume, DeviceStream stream,
+                       const BlockCache::Limits &limits, std::uint32_t group_size)
+    : device(of),
+      levels(make_level(of, volume, std::move(stream), limits)),
+      cache(of, limits, group_size) {}
 
 BlockStore::BlockStore(ocl::Device &of, const CompressedVolume &volume,
                        const RendererOptions &options, MemoryPlan made_by)
@@ -134,6 +150,13 @@ void BlockStore::decode_as(const std::vector<DecodedValues> &values) {
     level.range_error = values[i].range_error;
   }
   if (changes) clear();
+}
+
+void BlockStore::begin_host_pass(Wavefront &rays) {
+  PassCounts counts{};
+  counts.ray_count = 1;
+  counts.pass = counts.frame_pass = counts.last_frame_pass = rays.counts.read().front().pass + 1;
+  rays.counts.write({&counts, 1});
 }
 
 void BlockStore::provide(const CountsBuffer &asked, LevelRange of, Wavefront &rays) {

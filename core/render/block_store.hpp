@@ -49,9 +49,12 @@ struct Uploads {
 
 class BlockStore {
  public:
-  /// made: the finest level first.
-  BlockStore(ocl::Device &of, std::vector<Level> made, BlockCache empty)
-      : device(of), levels(std::move(made)), cache(std::move(empty)) {}
+  /// The finest level alone, for whoever knows how many slots it takes.
+  ///
+  /// volume  of `stream`, which is on the device or on its way there
+  /// Waits   yes
+  BlockStore(ocl::Device &of, const CompressedVolume &volume, DeviceStream stream,
+             const BlockCache::Limits &limits, std::uint32_t group_size);
 
   /// Uploads the volume, if it goes to the device, and computes the value ranges of its blocks.
   ///
@@ -80,6 +83,12 @@ class BlockStore {
   void provide(Wavefront &rays) {
     if (asked_) provide(rays.previous_counts, *asked_, rays);
   }
+  /// Begins a pass whose requests the host makes, and which is a frame of its own: slots are freed
+  /// in the order in which such passes have used them.
+  ///
+  /// Out    rays.counts
+  /// Waits  yes
+  void begin_host_pass(Wavefront &rays);
   /// The same for requests that `asked` counts, of those levels.
   void provide(const CountsBuffer &asked, LevelRange of, Wavefront &rays);
 
