@@ -17,7 +17,7 @@ ClosestHit closest_hit_from_string(std::string_view name) {
 
 Composite::Composite(ocl::Device &device, std::uint64_t num_rays, ClosestHit closest)
     : range_(ocl::Range::strided(num_rays, ocl::kGroupSize, device)),
-      kernel_(device, "composite", "composite", closest_defines(closest)) {}
+      kernel_(device, closest_defines(closest)) {}
 
 void Composite::operator()(const BlockCache &cache, Wavefront &rays, Compaction &compaction) {
   kernel_(range_, rays.frame, rays.counts, rays.active_ray_ids, rays.pair_block_ids,
