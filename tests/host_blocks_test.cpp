@@ -14,6 +14,7 @@
 
 #include "core/base/error.hpp"
 #include "core/host/host_blocks.hpp"
+#include "core/platform/memory.hpp"
 #include "core/view/detail.hpp"
 #include "kernels_cl/portable/block_grid.h"
 #include "kernels_cl/portable/cell_intersect.h"
@@ -313,11 +314,11 @@ TEST(HostBlocks, WorkIsDoneWithinAnyLimit) {
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
   const auto expected = test::twin_hits(volume, camera, size, 0.5f);
   const std::uint64_t least = HostBlocks::least_bytes(volume.info());
-  ASSERT_EQ(least, HostBlocks::bytes(volume.info()) + 9 * ReservedMemory::page_bytes());
+  ASSERT_EQ(least, HostBlocks::bytes(volume.info()) + 9 * platform::page_bytes());
   std::uint64_t num_alone = 0, last_decoded = ~std::uint64_t{0};
   for (const std::uint64_t pages : {0, 3, 12, 40, 1000}) {
     SCOPED_TRACE(fmt::format("{} pages more", pages));
-    const std::uint64_t limit = least + pages * ReservedMemory::page_bytes();
+    const std::uint64_t limit = least + pages * platform::page_bytes();
     HostBlocks blocks(volume.compressed, limit, 0);
     EXPECT_EQ(blocks.bytes(), HostBlocks::bytes(volume.info()));
     blocks.select(0.5f);
@@ -332,7 +333,7 @@ TEST(HostBlocks, WorkIsDoneWithinAnyLimit) {
       const auto y = static_cast<uint>(4 * item);
       trace(frame, field, {0, y, size.width, y + 4}, true, hits.data());
       // Two threads may ask for one page and count it twice for a moment.
-      if (blocks.bytes() > limit + ReservedMemory::page_bytes()) is_over = true;
+      if (blocks.bytes() > limit + platform::page_bytes()) is_over = true;
       alone += is_alone;
       ++ends[item];
     });
@@ -391,7 +392,7 @@ TEST(HostLoops, RangesOfParts) {
 }
 
 TEST(ReservedMemory, IsZerosUntilWrittenToAndAfterItsRelease) {
-  const std::uint64_t page = ReservedMemory::page_bytes(), num_bytes = (1ull << 36) + 5;
+  const std::uint64_t page = platform::page_bytes(), num_bytes = (1ull << 36) + 5;
   ReservedMemory memory(num_bytes);  // more than the machine has
   auto *bytes = static_cast<unsigned char *>(memory.data());
   for (const std::uint64_t at : {std::uint64_t{0}, 7 * page - 1, num_bytes - 1}) {

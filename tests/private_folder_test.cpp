@@ -1,7 +1,7 @@
-// core/base/private_folder: what another user can have written to is found, by every way that leads
-// there.
+// core/platform/private_folder: what another user can have written to is found, by every way that
+// leads there.
 
-#include "core/base/private_folder.hpp"
+#include "core/platform/private_folder.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -14,6 +14,8 @@ namespace isowave::core {
 namespace {
 
 namespace fs = std::filesystem;
+using platform::check_private;
+using platform::make_private;
 using test::TemporaryFolder;
 using test::write_file;
 using testing::HasSubstr;

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # rooms_test.sh <source folder>: the table of core/README.md names every room of core/, and no room
 # includes a header of a room below it in the table. kernels_cl/portable includes nothing but
-# itself. The tests that core/README.md names are there.
+# itself. Only core/platform calls the system. The tests that core/README.md names are there.
 set -euo pipefail
 cd "$1"
 
@@ -37,6 +37,23 @@ while IFS=: read -r file include; do
 done < <(grep -rnoE '^#include "kernels_cl/(device|probes)?/?[a-z_]*\.[a-z]*"' \
   core reference tests tools bench --include=*.?pp |
   grep -v 'kernels_cl/portable/' | sed 's/:[0-9]*:/:/')
+# Headers and functions of the system, beside those of the C++ standard. The Python module is
+# compiled with the public headers alone.
+headers='aio|arpa/.*|dirent|dlfcn|elf|execinfo|fcntl|ftw|grp|link|malloc|mntent|net.*|poll|pthread'
+headers+='|pwd|sched|semaphore|signal|spawn|sys/.*|syslog|termios|ucontext|unistd|utime|windows'
+functions='fileno|fdopen|fseeko|ftello|mkdtemp|mkstemp|popen|putenv|setenv|unsetenv'
+calls="#include <(csignal|($headers)\\.h)>|\\b($functions)\\(|\"/(proc|dev)/"
+must_call() { # 0|1 LINE
+  [ "$(grep -cE "$calls" <<< "$2")" -eq "$1" ] || fail "rooms_test: not $1 call of the system: $2"
+}
+must_call 1 '#include <sys/mman.h>'
+must_call 1 '#include <csignal>'
+must_call 1 '  ::setenv(name, value, 1);'
+must_call 0 '#include <string>'
+while read -r line; do
+  fail "$line: only core/platform calls the system"
+done < <(grep -rnE "$calls" core tools --include=*.?pp |
+  grep -vE '^(core/platform/|tools/python/module\.cpp:)')
 while IFS=. read -r suite name; do
   grep -qE "^TEST(_F|_P)?\\($suite, $name\\)" tests/*_test.cpp ||
     fail "core/README.md: there is no test $suite.$name"

@@ -1,10 +1,10 @@
 #include "core/base/fork.hpp"
 
-#include <pthread.h>
-
 #include <atomic>
+#include <mutex>
 
 #include "core/base/error.hpp"
+#include "core/platform/process.hpp"
 
 namespace isowave::core {
 
@@ -19,10 +19,10 @@ bool is_forked() {
 }
 
 void begin_threads() {
-  static const int watches_forks = pthread_atfork(nullptr, nullptr, [] {
+  static std::once_flag once;
+  std::call_once(once, platform::call_in_forks, [] {
     if (has_threads) has_lost_threads = true;
   });
-  static_cast<void>(watches_forks);
   has_threads = true;
 }
 

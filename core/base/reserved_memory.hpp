@@ -20,9 +20,6 @@ class ReservedMemory {
   /// Gives all pages back. What was written is zeros again.
   void release();
 
-  /// Bytes of a page, by which memory is provided.
-  static std::uint64_t page_bytes();
-
  private:
   std::uint64_t num_bytes_;
   void *data_ = nullptr;

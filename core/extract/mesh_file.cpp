@@ -1,7 +1,6 @@
 #include "core/extract/mesh_file.hpp"
 
 #include <fmt/format.h>
-#include <sys/mman.h>
 
 #include <algorithm>
 #include <array>
@@ -14,10 +13,12 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <system_error>
 #include <utility>
 
 #include "core/base/error.hpp"
 #include "core/base/text.hpp"
+#include "core/platform/memory.hpp"
 
 namespace isowave::core {
 
@@ -56,22 +57,20 @@ template <class T>
 std::span<const T> Spool<T>::all() {
   if (count_ == 0) return {};
   if (mapped_ == nullptr) {
-    void *mapped = MAP_FAILED;  // NOLINT(performance-no-int-to-ptr): the system's macro
+    std::error_code failure;
     if (std::fflush(file_.stream()) == 0)
-      mapped =
-          ::mmap(nullptr, count_ * sizeof(T), PROT_READ, MAP_SHARED, ::fileno(file_.stream()), 0);
-    if (mapped == MAP_FAILED) {  // NOLINT(performance-no-int-to-ptr)
-      throw Error("{}: cannot write: its scratch: {}", file_.target().string(),
-                  std::strerror(errno));
-    }
-    mapped_ = mapped;
+      mapped_ = platform::map_file(file_.stream(), count_ * sizeof(T), failure);
+    else
+      failure.assign(errno, std::generic_category());
+    if (failure)
+      throw Error("{}: cannot write: its scratch: {}", file_.target().string(), failure.message());
   }
   return {static_cast<const T *>(mapped_), count_};
 }
 
 template <class T>
 void Spool<T>::unmap() noexcept {
-  if (mapped_ != nullptr) ::munmap(const_cast<void *>(mapped_), count_ * sizeof(T));
+  if (mapped_ != nullptr) platform::unmap_file(mapped_, count_ * sizeof(T));
 }
 
 template class Spool<glm::dvec3>;

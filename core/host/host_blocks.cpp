@@ -7,6 +7,7 @@
 #include <mutex>
 
 #include "core/base/parallel_for.hpp"
+#include "core/platform/memory.hpp"
 #include "core/view/frame.hpp"
 #include "core/volume/range_thresholds.hpp"
 #include "kernels_cl/portable/block_cells.h"
@@ -62,7 +63,7 @@ void fill(std::vector<std::atomic<uchar>> &states, uchar value) {
 }
 
 std::uint64_t num_pages(std::uint64_t num_bytes) {
-  return (num_bytes + ReservedMemory::page_bytes() - 1) / ReservedMemory::page_bytes();
+  return (num_bytes + platform::page_bytes() - 1) / platform::page_bytes();
 }
 
 }  // namespace
@@ -79,7 +80,7 @@ std::uint64_t HostBlocks::bytes(const VolumeInfo &info) {
 }
 
 std::uint64_t HostBlocks::least_bytes(const VolumeInfo &info) {
-  return bytes(info) + kLeastPages * ReservedMemory::page_bytes();
+  return bytes(info) + kLeastPages * platform::page_bytes();
 }
 
 HostBlocks::HostBlocks(const CompressedVolume &volume, std::uint64_t memory_limit,
@@ -411,7 +412,7 @@ void HostBlocks::find_changing(std::size_t block, std::span<const std::size_t, 8
 /// The page that this byte is on will be written to. It counts before it is marked as taken, so
 /// that none is ever written to without having been counted.
 void HostBlocks::take_page(Pages &pages, std::uint64_t byte) {
-  const std::uint64_t page_bytes = ReservedMemory::page_bytes();
+  const std::uint64_t page_bytes = platform::page_bytes();
   std::atomic<uchar> &taken = pages.taken[byte / page_bytes];
   if (taken.load(std::memory_order_relaxed) != 0) return;
   if (num_bytes_.fetch_add(page_bytes, std::memory_order_relaxed) + page_bytes > memory_limit_) {

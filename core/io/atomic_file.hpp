@@ -64,8 +64,7 @@ class AtomicFile {
   AtomicFile(AtomicFile &&) noexcept;
 
   void choose_temporary_name();
-  /// Returns the descriptor, or -1 and errno.
-  int open_temporary();
+  void open_temporary();
   /// Gives the file its temporary name, if it has none.
   void give_name();
   /// As give_name(), and closes the file.

@@ -8,6 +8,8 @@
 #include <span>
 #include <string>
 
+#include "core/platform/file.hpp"
+
 namespace isowave::core {
 
 /// A regular file, open for reading. Anything else is refused: reading a pipe would wait for
@@ -18,9 +20,6 @@ class InputFile {
   /// Throws  Error: there is none, it cannot be opened, or it is not a regular file
   InputFile(const std::filesystem::path &path, std::string what);
   explicit InputFile(const std::filesystem::path &path) : InputFile(path, path.string()) {}
-  ~InputFile();
-  InputFile(const InputFile &) = delete;
-  InputFile &operator=(const InputFile &) = delete;
 
   const std::filesystem::path &path() const { return path_; }
   const std::string &what() const { return what_; }
@@ -36,7 +35,7 @@ class InputFile {
   std::filesystem::path path_;
   std::string what_;
   std::uint64_t size_ = 0;
-  int descriptor_ = -1;
+  platform::File file_;
 };
 
 /// Throws  Error where InputFile(path) does

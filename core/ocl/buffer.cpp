@@ -1,15 +1,15 @@
 #include "core/ocl/buffer.hpp"
 
-#include <sys/mman.h>
-
 #include <algorithm>
 #include <array>
 #include <cstring>
 #include <memory>
 #include <stdexcept>
+#include <system_error>
 
 #include "core/base/error.hpp"
 #include "core/ocl/in_process.hpp"
+#include "core/platform/memory.hpp"
 
 namespace isowave::core::ocl {
 
@@ -85,13 +85,14 @@ constexpr std::size_t kLeastBytesInPages = 1u << 16;
 
 struct Pages {
   std::size_t bytes;
-  void operator()(void *begin) const { ::munmap(begin, bytes); }
+  void operator()(void *begin) const { platform::free_pages(begin, bytes); }
 };
 
 /// In pages of this process, all zero, which the system provides where they are written to.
 cl::Buffer make_in_pages(const cl::Context &context, std::size_t bytes) {
-  void *begin = ::mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
-  if (begin == MAP_FAILED) throw cl::Error(CL_MEM_OBJECT_ALLOCATION_FAILURE, "mmap");
+  std::error_code refusal;
+  void *begin = platform::take_pages(bytes, platform::PageUse::kMost, refusal);
+  if (begin == nullptr) throw cl::Error(CL_MEM_OBJECT_ALLOCATION_FAILURE, "mmap");
   using Owner = std::unique_ptr<void, Pages>;
   auto pages = std::make_unique<Owner>(begin, Pages{bytes});
   cl::Buffer mem(context, CL_MEM_READ_WRITE | CL_MEM_USE_HOST_PTR, bytes, begin);

@@ -2,8 +2,6 @@
 
 #include "core/ocl/device_list.hpp"
 
-#include <sys/mman.h>
-
 #include <algorithm>
 #include <cstdlib>
 #include <optional>
@@ -13,6 +11,7 @@
 #include "core/base/parallel_for.hpp"
 #include "core/base/text.hpp"
 #include "core/ocl/driver_environment.hpp"
+#include "core/platform/memory.hpp"
 
 namespace isowave::core::ocl {
 
@@ -150,11 +149,7 @@ std::size_t bytes_of_driver() {
 /// Whether there was room for a driver before any was loaded. Without room, OpenCL's loader passes
 /// over drivers without a word, and PoCL 3.1 may end the process.
 bool has_room_for_driver() {
-  static const bool has_room = [] {
-    void *room = ::mmap(nullptr, bytes_of_driver(), PROT_NONE,
-                        MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
-    return room != MAP_FAILED && ::munmap(room, bytes_of_driver()) == 0;
-  }();
+  static const bool has_room = platform::has_address_space(bytes_of_driver());
   return has_room;
 }
 

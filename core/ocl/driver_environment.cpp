@@ -1,8 +1,6 @@
 #include "core/ocl/driver_environment.hpp"
 
 #include <fmt/format.h>
-#include <pwd.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -13,9 +11,11 @@
 #include <vector>
 
 #include "core/base/error.hpp"
-#include "core/base/names_in.hpp"
-#include "core/base/private_folder.hpp"
 #include "core/ocl/environment.hpp"
+#include "core/platform/names_in.hpp"
+#include "core/platform/new_file.hpp"
+#include "core/platform/private_folder.hpp"
+#include "core/platform/process.hpp"
 
 namespace isowave::core::ocl {
 
@@ -50,11 +50,8 @@ std::optional<fs::path> usual_nvidia_folder() {
 /// Mesa takes the home from the list of users, whatever HOME is.
 std::optional<fs::path> usual_mesa_folder() {
   if (const std::string folder = environment("XDG_CACHE_HOME"); !folder.empty()) return folder;
-  std::vector<char> text(1 << 16);
-  passwd entry{}, *found = nullptr;
-  if (::getpwuid_r(::getuid(), &entry, text.data(), text.size(), &found) != 0 || found == nullptr)
-    return {};
-  return fs::path(entry.pw_dir) / ".cache";
+  const auto home = platform::home_by_list();
+  return home ? std::optional(*home / ".cache") : std::nullopt;
 }
 
 struct Driver {
@@ -134,10 +131,11 @@ std::optional<fs::path> wanted_folder(const Driver &driver) {
   return driver.usual_folder();
 }
 
-FolderCheck check_parts(const Driver &driver, const fs::path &folder) {
-  FolderCheck result;
+platform::FolderCheck check_parts(const Driver &driver, const fs::path &folder) {
+  platform::FolderCheck result;
   for (const char *part : driver.parts) {
-    const FolderCheck check = check_private(*part == 0 ? folder : folder / part);
+    const platform::FolderCheck check =
+        platform::check_private(*part == 0 ? folder : folder / part);
     if (result.danger.empty()) result = check;
   }
   if (*driver.parts.front() != 0) result.path = result.path.parent_path();
@@ -152,13 +150,12 @@ bool is_usable(const fs::path &wanted) {
   while (folder.has_relative_path() &&
          fs::status(folder, failure).type() == fs::file_type::not_found)
     folder = folder.parent_path();
-  if (!fs::is_directory(folder, failure) || ::access(folder.c_str(), W_OK | X_OK) != 0)
-    return false;
+  if (!fs::is_directory(folder, failure) || !platform::can_fill(folder, failure)) return false;
   if (folder == wanted) {
-    for (const std::string &name : names_in(folder)) {  // root may have made some, by sudo
+    for (const std::string &name :
+         platform::names_in(folder)) {  // root may have made some, by sudo
       const fs::path entry = folder / name;
-      if (fs::is_directory(entry, failure) && ::access(entry.c_str(), W_OK | X_OK) != 0)
-        return false;
+      if (fs::is_directory(entry, failure) && !platform::can_fill(entry, failure)) return false;
     }
   }
   const fs::space_info space = fs::space(folder, failure);
@@ -167,13 +164,13 @@ bool is_usable(const fs::path &wanted) {
 
 /// Returns an empty path if there is none.
 fs::path make_other_folder(const Driver &driver) {
-  const std::string name = fmt::format("isowave-kernels-{}", ::geteuid());
+  const std::string name = fmt::format("isowave-kernels-{}", platform::user_id());
   for (const std::string &parent :
        {environment("TMPDIR"), std::string("/tmp"), std::string("/var/tmp")}) {
     if (parent.empty()) continue;
-    const fs::path folder = make_private(parent, name);
+    const fs::path folder = platform::make_private(parent, name);
     if (folder.empty()) continue;
-    fs::path own = make_private(folder, driver.name);
+    fs::path own = platform::make_private(folder, driver.name);
     if (!own.empty() && is_usable(own)) return own;
   }
   return {};
@@ -189,11 +186,11 @@ KernelFolder choose_folder(std::size_t index) {
   if (!wanted && !is_pocl) return result;
   std::string reason = "neither HOME nor XDG_CACHE_HOME is set";
   if (wanted) {
-    const FolderCheck check = check_parts(driver, *wanted);
+    const platform::FolderCheck check = check_parts(driver, *wanted);
     const bool is_safe = check.danger.empty();
     if (is_safe && (!is_pocl || is_usable(check.path))) {
       // The folder that was checked, whatever the working folder will be.
-      if (check.path != *wanted) ::setenv(driver.variable, check.path.c_str(), 1);
+      if (check.path != *wanted) platform::set_environment(driver.variable, check.path.c_str());
       return result;
     }
     reason = is_safe ? fmt::format("PoCL cannot write to {}", wanted->string())
@@ -207,9 +204,9 @@ KernelFolder choose_folder(std::size_t index) {
   // The driver keeps out of an unsafe folder even if its devices are only listed.
   const fs::path other = make_other_folder(driver);
   if (other.empty())
-    ::setenv(driver.off, driver.value_of_off, 1);
+    platform::set_environment(driver.off, driver.value_of_off);
   else
-    ::setenv(driver.variable, other.c_str(), 1);
+    platform::set_environment(driver.variable, other.c_str());
   if (is_named) {
     result.refusal =
         fmt::format("{}: set {} to a folder that only you can write to", reason, driver.variable);
@@ -231,10 +228,11 @@ void complete_path() {
   const std::string path = environment("PATH");
   for (std::size_t begin = 0; begin < path.size();) {
     const std::size_t end = std::min(path.find(':', begin), path.size());
-    if (::access((path.substr(begin, end - begin) + "/ld").c_str(), X_OK) == 0) return;
+    if (platform::can_run(path.substr(begin, end - begin) + "/ld")) return;
     begin = end + 1;
   }
-  ::setenv("PATH", (path + (path.empty() ? "" : ":") + "/usr/local/bin:/usr/bin:/bin").c_str(), 1);
+  const std::string longer = path + (path.empty() ? "" : ":") + "/usr/local/bin:/usr/bin:/bin";
+  platform::set_environment("PATH", longer.c_str());
 }
 
 }  // namespace
@@ -244,7 +242,7 @@ void prepare_for_drivers() {
   std::call_once(once, [] {
     complete_path();
     if (environment("POCL_CACHE_DIR").empty())
-      ::unsetenv("POCL_CACHE_DIR");  // PoCL ends the process where it is empty
+      platform::unset_environment("POCL_CACHE_DIR");  // PoCL ends the process where it is empty
     for (std::size_t i = 0; i < kNumDrivers; ++i) state().folders[i] = choose_folder(i);
   });
 }

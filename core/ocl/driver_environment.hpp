@@ -10,7 +10,7 @@
 namespace isowave::core::ocl {
 
 /// Sees to it that each driver keeps its kernels in a folder of this user's alone
-/// (core/base/private_folder.hpp) and that PoCL can write to its folder: without one, PoCL 3.1
+/// (core/platform/private_folder.hpp) and that PoCL can write to its folder: without one, PoCL 3.1
 /// offers no device, fails to build, or ends the process. If the driver's usual folder will not do,
 /// it is given one below TMPDIR, /tmp or /var/tmp, by its environment variable; if there is none,
 /// its kernels are not kept. Adds the usual folders to a PATH without a linker, which PoCL runs.

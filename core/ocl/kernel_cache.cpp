@@ -5,8 +5,8 @@
 #include <string>
 #include <system_error>
 
-#include "core/base/names_in.hpp"
 #include "core/ocl/driver_environment.hpp"
+#include "core/platform/names_in.hpp"
 
 namespace isowave::core::ocl {
 
@@ -34,7 +34,7 @@ bool KernelCache::has_new_kernels() const {
 }
 
 bool KernelCache::has_new_kernels(const fs::path &folder) const {
-  return std::ranges::any_of(names_in(folder), [&](const std::string &name) {
+  return std::ranges::any_of(platform::names_in(folder), [&](const std::string &name) {
     const fs::path path = folder / name;
     std::error_code gone;  // drivers make temporary files there
     const fs::file_type type = fs::symlink_status(path, gone).type();

@@ -1,12 +1,6 @@
 #include "core/sources/layer_reader.hpp"
 
-#include <unistd.h>
-
-#include <algorithm>
-#include <cerrno>
-#include <cstdlib>
-#include <cstring>
-#include <string>
+#include <system_error>
 #include <utility>
 
 #include "core/base/error.hpp"
@@ -16,49 +10,33 @@ namespace isowave::core {
 
 namespace {
 
-/// Most bytes that one call of read() takes, with room to spare.
-constexpr std::size_t kMostBytes = std::size_t{1} << 30;
-
-[[noreturn]] void fail(const char *what) {
+void check(const std::error_code &failure, const char *what) {
+  if (!failure) return;
   throw Error(
       "{} a temporary file: {}; set TMPDIR to a folder with room for the whole volume, or compress "
       "at a rate, which needs none",
-      what, std::strerror(errno));
+      what, failure.message());
 }
 
 }  // namespace
 
 TemporaryFile::TemporaryFile() {
-  const char *folder = std::getenv("TMPDIR");
-  std::string name =
-      std::string(folder != nullptr && *folder != 0 ? folder : "/tmp") + "/isowave_XXXXXX";
-  file_ = ::mkstemp(name.data());
-  if (file_ < 0) fail("cannot make");
-  ::unlink(name.c_str());
-}
-
-TemporaryFile::~TemporaryFile() {
-  ::close(file_);
+  std::error_code failure;
+  file_ = platform::File::make_temporary(failure);
+  check(failure, "cannot make");
 }
 
 void TemporaryFile::append(std::span<const std::byte> bytes) {
-  while (!bytes.empty()) {
-    const ssize_t written = ::write(file_, bytes.data(), std::min(bytes.size(), kMostBytes));
-    if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) fail("cannot write to");
-    bytes = bytes.subspan(static_cast<std::size_t>(written));
-  }
+  std::error_code failure;
+  file_.append(bytes, failure);
+  check(failure, "cannot write to");
 }
 
 void TemporaryFile::read(std::uint64_t offset, std::span<std::byte> bytes) const {
-  while (!bytes.empty()) {
-    const ssize_t got = ::pread(file_, bytes.data(), std::min(bytes.size(), kMostBytes),
-                                static_cast<off_t>(offset));
-    if (got < 0 && errno == EINTR) continue;
-    if (got <= 0) fail("cannot read");
-    bytes = bytes.subspan(static_cast<std::size_t>(got));
-    offset += static_cast<std::uint64_t>(got);
-  }
+  std::error_code failure;
+  const std::size_t count = file_.read(offset, bytes, failure);
+  if (count < bytes.size() && !failure) failure = std::make_error_code(std::errc::io_error);
+  check(failure, "cannot read");
 }
 
 LayerSource::LayerSource(const VolumeInfo &info, ReadLayers read, bool keep)

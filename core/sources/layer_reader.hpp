@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "core/platform/file.hpp"
 #include "core/volume/volume.hpp"
 
 namespace isowave::core {
@@ -21,9 +22,6 @@ class TemporaryFile {
  public:
   /// Throws  Error: it cannot be made
   TemporaryFile();
-  ~TemporaryFile();
-  TemporaryFile(const TemporaryFile &) = delete;
-  TemporaryFile &operator=(const TemporaryFile &) = delete;
 
   /// Throws  Error: the disk is full, and such
   void append(std::span<const std::byte> bytes);
@@ -31,7 +29,7 @@ class TemporaryFile {
   void read(std::uint64_t offset, std::span<std::byte> bytes) const;
 
  private:
-  int file_;
+  platform::File file_;
 };
 
 /// What several readers of one volume share: the function, and what it has given.

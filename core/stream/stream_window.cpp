@@ -3,8 +3,8 @@
 #include <algorithm>
 
 #include "core/base/error.hpp"
-#include "core/base/host_memory.hpp"
 #include "core/base/parallel_for.hpp"
+#include "core/platform/memory.hpp"
 
 namespace isowave::core {
 
@@ -82,7 +82,7 @@ void StreamWindow::copy_payload(std::uint64_t max_copy) {
 }
 
 std::uint64_t StreamWindow::default_max_copy() {
-  return host_memory() / 4;
+  return platform::host_memory() / 4;
 }
 
 std::uint64_t StreamWindow::words_per_block(const CompressedVolume &volume) {

@@ -1,10 +1,11 @@
 #include "tools/isowave/compile_report.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <cstdio>
 #include <utility>
+
+#include "core/platform/streams.hpp"
 
 namespace isowave::core::tools {
 
@@ -16,7 +17,7 @@ constexpr double kWorthSayingMs = 250;
 }  // namespace
 
 CompileReport::CompileReport(ocl::Device &device) : device_(device), cache_(device.info()) {
-  if (::isatty(STDERR_FILENO) == 0) return;
+  if (!platform::errors_go_to_terminal()) return;
   device_.on_new_kernel([this](std::string_view kernel) {
     fmt::print(stderr, "\r\x1b[Kcompiling kernels for {}: {}, {}", device_.info().name,
                ++num_kernels_, kernel);

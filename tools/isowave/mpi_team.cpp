@@ -2,11 +2,7 @@
 
 #ifdef ISOWAVE_HAS_MPI
 
-#include <fcntl.h>
 #include <mpi.h>
-#include <sys/mman.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -14,11 +10,9 @@
 #include <cerrno>
 #include <chrono>
 #include <climits>
-#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <fstream>
 #include <limits>
 #include <optional>
 #include <stdexcept>
@@ -28,6 +22,10 @@
 #include "core/base/error.hpp"
 #include "core/base/parallel_for.hpp"
 #include "core/io/atomic_file.hpp"
+#include "core/platform/new_file.hpp"
+#include "core/platform/shared_memory.hpp"
+#include "core/platform/signals.hpp"
+#include "core/platform/streams.hpp"
 #include "core/zfp/zfp_trailer.hpp"
 
 namespace isowave::core::tools {
@@ -92,10 +90,7 @@ class HostWords {
     alone_.resize(capacity_);
     segments_ = {alone_};
   }
-  ~HostWords() {
-    if (memory_ != MAP_FAILED) ::munmap(memory_, num_bytes());
-    MPI_Comm_free(&comm_);
-  }
+  ~HostWords() { MPI_Comm_free(&comm_); }
   HostWords(const HostWords &) = delete;
   HostWords &operator=(const HostWords &) = delete;
 
@@ -220,32 +215,19 @@ class HostWords {
   /// False, at all processes, where one cannot. MPI's own shared memory leaves them waiting for
   /// each other then.
   bool allocate() {
-    std::array<char, 64> name{};
-    int file = -1;
+    std::array<char, 64> name{};  // empty: there is none
     if (is_first()) {
-      unsigned id = 0;
-      do {  // another user may have taken a name
-        fmt::format_to_n(name.data(), name.size() - 1, "/isowave.{}.{}", ::getpid(), id++);
-        file = ::shm_open(name.data(), O_CREAT | O_EXCL | O_RDWR, 0600);
-      } while (file < 0 && errno == EEXIST);
-      if (file >= 0 && ::posix_fallocate(file, 0, static_cast<off_t>(num_bytes())) != 0) {
-        ::close(file);
-        file = -1;
-      }
+      memory_ = platform::SharedMemory::make(num_bytes());
+      if (memory_.data() != nullptr) memory_.name().copy(name.data(), name.size() - 1);
     }
     MPI_Bcast(name.data(), static_cast<int>(name.size()), MPI_CHAR, 0, comm_);
-    int is_there = file >= 0 ? 1 : 0;
-    MPI_Bcast(&is_there, 1, MPI_INT, 0, comm_);
-    if (is_there != 0 && !is_first()) file = ::shm_open(name.data(), O_RDWR, 0);
-    if (file >= 0) {
-      memory_ = ::mmap(nullptr, num_bytes(), PROT_READ | PROT_WRITE, MAP_SHARED, file, 0);
-      ::close(file);
-    }
-    is_there = memory_ != MAP_FAILED ? 1 : 0;
+    if (name.front() != '\0' && !is_first())
+      memory_ = platform::SharedMemory::open(name.data(), num_bytes());
+    int is_there = memory_.data() != nullptr ? 1 : 0;
     MPI_Allreduce(MPI_IN_PLACE, &is_there, 1, MPI_INT, MPI_LAND, comm_);
-    if (is_first()) ::shm_unlink(name.data());
+    if (is_first()) memory_.remove_name();
     if (is_there == 0) return false;
-    auto *words = static_cast<std::uint64_t *>(memory_);
+    auto *words = static_cast<std::uint64_t *>(memory_.data());
     for (int rank = 0; rank < size_; ++rank, words += num_words())
       segments_.emplace_back(words, num_words());
     part_numbers_ = reinterpret_cast<std::uint32_t *>(words);
@@ -253,7 +235,7 @@ class HostWords {
   }
 
   MPI_Comm comm_ = MPI_COMM_NULL;
-  void *memory_ = MAP_FAILED;
+  platform::SharedMemory memory_;
   int rank_ = 0, size_ = 1;
   std::uint64_t capacity_ = 0;
   std::vector<std::span<std::uint64_t>> segments_;  ///< by rank
@@ -415,58 +397,12 @@ class MpiTeam : public Team {
 
 std::unique_ptr<MpiTeam> team_of_job;
 
-/// A file of several hosts' processes, which each of them removes if it ends before its time: where
-/// one dies, mpirun ends the others, by a signal, or MPI itself does. If all are killed at once,
-/// the file stays.
-std::array<char, 4096> unfinished_file;
-constexpr int kEndingSignals[] = {SIGTERM, SIGINT, SIGHUP, SIGABRT};
-
-extern "C" void remove_unfinished() {
-  if (unfinished_file.front() != '\0') ::unlink(unfinished_file.data());
-}
-
-extern "C" void remove_unfinished_by_signal(int number) {
-  remove_unfinished();
-  std::signal(number, SIG_DFL);
-  ::raise(number);
-}
-
-void remove_at_end(const std::string &name) {
-  static const int registered = std::atexit(remove_unfinished);
-  static_cast<void>(registered);
-  if (name.size() >= unfinished_file.size()) return;
-  std::strcpy(unfinished_file.data(), name.c_str());
-  for (const int number : kEndingSignals) std::signal(number, remove_unfinished_by_signal);
-}
-
-/// Open MPI prints a line of its own where a write fails. Silent as long as this lives.
-class Hushed {
- public:
-  Hushed() : stderr_(::dup(STDERR_FILENO)), nowhere_(::open("/dev/null", O_WRONLY | O_CLOEXEC)) {
-    if (stderr_ >= 0 && nowhere_ >= 0) ::dup2(nowhere_, STDERR_FILENO);
-  }
-  ~Hushed() {
-    const int error_number = errno;
-    if (stderr_ >= 0) ::dup2(stderr_, STDERR_FILENO);
-    for (const int file : {stderr_, nowhere_}) {
-      if (file >= 0) ::close(file);
-    }
-    errno = error_number;
-  }
-  Hushed(const Hushed &) = delete;
-  Hushed &operator=(const Hushed &) = delete;
-
- private:
-  int stderr_, nowhere_;
-};
-
 /// The same text at processes that see the same file by that name; empty if there is none.
 std::string identity_of(const std::string &name) {
-  struct stat status {};
-  std::string system;
-  std::ifstream("/proc/sys/kernel/random/boot_id") >> system;
-  if (system.empty() || ::stat(name.c_str(), &status) != 0) return {};
-  return fmt::format("{} {} {}", system, status.st_dev, status.st_ino);
+  std::error_code failure;
+  const std::string system = platform::system_identity(),
+                    file = platform::identity_of(name, failure);
+  return system.empty() || failure ? "" : system + " " + file;
 }
 
 /// Rank 0 has an AtomicFile, which each process opens by itself, so that one that cannot leaves no
@@ -484,7 +420,7 @@ class MpiFile : public SharedFile {
         if (is_first()) name = own_->name_anywhere().string();
       });
       name = of_first(name);
-      remove_at_end(name);
+      platform::remove_at_end(name);  // if all are killed at once, it stays
     }
     try {
       together(team, [&] {
@@ -506,7 +442,7 @@ class MpiFile : public SharedFile {
       MPI_Status status;
       int count = 0;
       check([&] {
-        const Hushed hushed;
+        const platform::HushedErrors hushed;  // Open MPI prints a line of its own
         return MPI_File_write_at(file_, static_cast<MPI_Offset>(offset), bytes.data(),
                                  static_cast<int>(std::min(bytes.size(), kMostBytes)), MPI_BYTE,
                                  &status);
@@ -564,7 +500,6 @@ class MpiFile : public SharedFile {
 };
 
 std::string checksum;  ///< of the command line
-int loud_stderr = -1;  ///< of a rank that is silent
 
 /// Without asking MPI, which takes long to begin: the variables that its launchers set.
 bool has_launcher() {
@@ -572,16 +507,6 @@ bool has_launcher() {
     if (std::getenv(name) != nullptr) return true;
   }
   return false;
-}
-
-void fall_silent() {
-  std::fflush(nullptr);
-  loud_stderr = ::dup(STDERR_FILENO);
-  const int nowhere = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
-  if (nowhere < 0) return;
-  ::dup2(nowhere, STDOUT_FILENO);
-  ::dup2(nowhere, STDERR_FILENO);
-  ::close(nowhere);
 }
 
 /// Whether all ranks come to their end, within a few seconds.
@@ -609,7 +534,7 @@ MpiJob::MpiJob(int *argc, char ***argv) {
   checksum = std::to_string(crc);
   team_of_job = std::make_unique<MpiTeam>();
   if (team_of_job->size() == 1) return;
-  if (team_of_job->rank() != 0) fall_silent();
+  if (team_of_job->rank() != 0) platform::fall_silent();
 }
 
 MpiJob::~MpiJob() {
@@ -621,8 +546,7 @@ int MpiJob::finish(int status) {
   if (status != 0 && !all_end()) {
     const std::string line = "isowave: rank " + std::to_string(team_of_job->rank()) +
                              " has failed while others go on: the job ends\n";
-    if (::write(loud_stderr < 0 ? STDERR_FILENO : loud_stderr, line.data(), line.size()) < 0)
-      status = 1;  // nobody can be told
+    platform::write_error_aloud(line);
     MPI_Abort(MPI_COMM_WORLD, 1);
   }
   if (status == 0) {

@@ -1,19 +1,16 @@
 #include "tools/isowave/outputs.hpp"
 
 #include <fmt/format.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 #include <string_view>
 #include <system_error>
 
 #include "core/base/error.hpp"
-#include "core/base/names_in.hpp"
 #include "core/io/atomic_file.hpp"
 #include "core/io/open_volume.hpp"
+#include "core/platform/names_in.hpp"
+#include "core/platform/new_file.hpp"
 #include "core/volume/volume.hpp"
 #include "tools/isowave/volume_options.hpp"
 
@@ -27,14 +24,14 @@ namespace {
 /// Error where it can be neither.
 std::string key_of(const fs::path &path) {
   const fs::path target = follow_links(path);
-  struct stat status {};
-  if (::stat(target.c_str(), &status) == 0)
-    return fmt::format("{}:{}", status.st_dev, status.st_ino);
-  const int reason = errno;
+  std::error_code failure, no_folder;
+  const std::string key = platform::identity_of(target, failure);
+  if (!failure) return key;
   const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
-  if (reason == ENOENT && ::stat(folder.c_str(), &status) == 0)
-    return fmt::format("{}:{}/{}", status.st_dev, status.st_ino, target.filename().string());
-  throw Error("{}: cannot write: {}", path.string(), std::strerror(reason));
+  const std::string folder_key = platform::identity_of(folder, no_folder);
+  if (failure == std::errc::no_such_file_or_directory && !no_folder)
+    return fmt::format("{}/{}", folder_key, target.filename().string());
+  throw Error("{}: cannot write: {}", path.string(), failure.message());
 }
 
 /// Standard output has the command's messages.
@@ -88,24 +85,24 @@ void Outputs::write_pictures(const std::string &option, const fs::path &folder,
   }
   if (!fs::is_directory(existing, failure))
     throw Error("cannot make the folder {}: {} is no folder", folder.string(), existing.string());
-  if (::access(existing.c_str(), W_OK | X_OK) != 0)
-    throw Error("cannot make or fill the folder {}: {}", folder.string(), std::strerror(errno));
+  if (!platform::can_fill(existing, failure))
+    throw Error("cannot make or fill the folder {}: {}", folder.string(), failure.message());
   if (!made.empty()) {
     new_folder_ = folder;
     if (const auto user = users_.find(key_of(made)); user != users_.end())
       throw Error("{} {}: it would take the place of {}", option, folder.string(), user->second);
     return;
   }
-  struct stat status {};
-  if (::stat(folder.c_str(), &status) != 0) return;
-  for (const std::string &name : names_in(folder)) {
+  const std::string folder_key = platform::identity_of(folder, failure);
+  if (failure) return;
+  for (const std::string &name : platform::names_in(folder)) {
     if (!name.starts_with(prefix) || !name.ends_with(".png") || !fs::exists(folder / name, failure))
       continue;
     if (const auto user = users_.find(key_of(folder / name)); user != users_.end())
       throw Error("{} {}: {} could take the place of {}", option, folder.string(), name,
                   user->second);
   }
-  const std::string in_folder = fmt::format("{}:{}/{}", status.st_dev, status.st_ino, prefix);
+  const std::string in_folder = fmt::format("{}/{}", folder_key, prefix);
   for (const auto &[key, user] : users_) {
     if (key.starts_with(in_folder) && key.ends_with(".png"))
       throw Error("{} {}: a picture could take the place of {}", option, folder.string(), user);

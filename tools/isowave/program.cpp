@@ -1,16 +1,10 @@
 #include "tools/isowave/program.hpp"
 
-#include <execinfo.h>
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
-#include <array>
 #include <cerrno>
-#include <csignal>
 #include <cstdio>
 #include <cstring>
-#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <new>
@@ -26,6 +20,10 @@
 #include "core/ocl/arithmetic.hpp"
 #include "core/ocl/device.hpp"
 #include "core/ocl/driver_environment.hpp"
+#include "core/platform/file.hpp"
+#include "core/platform/process.hpp"
+#include "core/platform/signals.hpp"
+#include "core/platform/streams.hpp"
 #include "isowave/version.hpp"
 #include "tools/isowave/strict_options.hpp"
 
@@ -33,36 +31,15 @@ namespace isowave::core::tools {
 
 namespace {
 
-/// Gives descriptors 0 to 2 that are closed to /dev/null, or the next file that is opened would be
-/// standard input or output. In the wrong direction, so that whoever uses one finds that it fails.
-void open_standard_streams() {
-  for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
-    if (::fcntl(fd, F_GETFD) == -1 && errno == EBADF)
-      ::open("/dev/null", fd == STDIN_FILENO ? O_WRONLY : O_RDONLY);
-  }
-}
-
-/// To a file of its own in the folder for temporary files. Returns its name, or nothing where that
-/// fails.
-std::string keep_log(const std::string &log) {
-  std::error_code failure;
-  std::string name =
-      (std::filesystem::temp_directory_path(failure) / "isowave_build_log_XXXXXX").string();
-  const int fd = failure ? -1 : ::mkstemp(name.data());
-  if (fd < 0) return {};
-  const bool written = ::write(fd, log.data(), log.size()) == static_cast<ssize_t>(log.size());
-  ::close(fd);
-  if (written) return name;
-  ::unlink(name.c_str());
-  return {};
-}
-
 /// One line, to be called in a catch clause. What a compiler of kernels said is kept in a file.
 std::string text_of_failure(const std::string &command) {
   try {
     throw;
   } catch (const BuildError &error) {
-    const std::string name = error.log().empty() ? "" : keep_log(error.log());
+    const std::string name =
+        error.log().empty()
+            ? ""
+            : platform::keep_in_temporary_folder("isowave_build_log", error.log()).string();
     return error.what() +
            (name.empty() ? "" : fmt::format("; the compiler's whole log is {}", name));
   } catch (...) {
@@ -105,8 +82,7 @@ void print_line(const std::string &name, const std::string &text) {
 
 /// Takes no memory.
 void print_out_of_memory() {
-  constexpr std::string_view kLine = "isowave: out of memory\n";
-  static_cast<void>(!::write(STDERR_FILENO, kLine.data(), kLine.size()));
+  platform::write_error("isowave: out of memory\n");
 }
 
 /// For exceptions that nothing can catch: of objects that are made before main() begins, and of
@@ -118,17 +94,10 @@ void print_out_of_memory() {
   });
 }
 
-/// Has glibc load its unwinder while there is memory. Else glibc does so when it first unwinds one
-/// of its own functions, and aborts the process if it cannot.
-void load_unwinder() {
-  std::array<void *, 1> frames{};
-  ::backtrace(frames.data(), frames.size());
-}
-
 }  // namespace
 
 int run_main(const std::function<int()> &work) {
-  load_unwinder();
+  platform::load_unwinder();
   try {
     return work();
   } catch (...) {
@@ -138,8 +107,8 @@ int run_main(const std::function<int()> &work) {
 }
 
 int run_program(CLI::App &app, int argc, char **argv) {
-  open_standard_streams();
-  std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow further is an error like any other
+  platform::open_standard_streams();
+  platform::survive_file_size_limit();
   OutputGroup outputs;
   std::optional<std::string> message;
   int status = 1;

@@ -1,7 +1,6 @@
 #include "tools/isowave/volume_options.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -14,6 +13,7 @@
 #include "core/bricks/compress_together.hpp"
 #include "core/io/raw_reader.hpp"
 #include "core/ocl/device.hpp"
+#include "core/platform/streams.hpp"
 #include "core/sources/generate.hpp"
 #include "core/zfp/describe_compression.hpp"
 #include "core/zfp/isovalue.hpp"
@@ -183,7 +183,7 @@ std::string volume_stem(const std::string &path) {
 }
 
 Progress make_progress_bar(std::string_view label) {
-  if (::isatty(STDERR_FILENO) == 0) return {};
+  if (!platform::errors_go_to_terminal()) return {};
   // The line is erased when the last copy goes, be it after the work or after an error.
   const std::shared_ptr<void> eraser(nullptr, [](void *) { fmt::print(stderr, "\r\x1b[K"); });
   return [eraser, text = std::string(label), shown = -1](std::uint32_t done,
