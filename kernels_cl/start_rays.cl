@@ -51,7 +51,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_ra
     uint begins_frame, global const GivenRay *given, global const uint *macrocell_masks,
     global const ushort *ranges, global const uint *no_data, uint no_data_begin,
     global PassCounts *counts, global PassCounts *next, global uint *next_active_ray_ids,
-    global uint *ray_block_ids, global uint *hit_words) {
+    global uint *ray_block_ids, global ISO_WORDS(HitRecord) *hit_words) {
   const FrameParams *frame = &frame_params;
   local uint found[ISO_GROUP_SIZE], counters[2];
   const PixelBox box = {frame->screen.begin_x, frame->screen.begin_y, frame->screen.end_x,

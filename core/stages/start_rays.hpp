@@ -4,6 +4,7 @@
 
 #include "core/stages/levelled_kernel.hpp"
 #include "core/stages/macrocells.hpp"
+#include "kernels/start_rays.hpp"
 
 namespace isowave::core {
 
@@ -27,10 +28,7 @@ class StartRays {
  private:
   RaySource source_;
   ocl::Range range_;
-  LevelledKernel<FrameParams, ocl::In<FrameParams>, uint, uint, uint, ocl::In<GivenRay>,
-                 ocl::In<uint>, ocl::In<cl_ushort>, ocl::In<uint>, uint, ocl::Out<PassCounts>,
-                 ocl::Out<PassCounts>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<HitRecord>>
-      kernel_;
+  LevelledKernel<kernels::start_rays> kernel_;
 };
 
 }  // namespace isowave::core
