@@ -2,7 +2,7 @@
 // block_triangles.cl. marching_cubes makes meshes of the same surfaces.
 
 #include "bench/surface_rig.hpp"
-#include "core/stages/block_triangles.hpp"
+#include "core/paper/block_triangles.hpp"
 
 namespace isowave::core::bench {
 namespace {

@@ -12,9 +12,9 @@
 #include "bench/run_info.hpp"
 #include "core/base/error.hpp"
 #include "core/base/ms_since.hpp"
-#include "core/bricks/brick_renderer.hpp"
 #include "core/bricks/brick_volume.hpp"
 #include "core/bricks/ranks.hpp"
+#include "core/bricks/team_renderer.hpp"
 #include "core/volume/range_thresholds.hpp"
 #include "tools/isowave/mpi_team.hpp"
 #include "tools/isowave/outputs.hpp"
@@ -48,7 +48,7 @@ struct Times {
   std::vector<double> passes;       ///< of this process
 };
 
-void draw(BrickRenderer &renderer, Team &team, const FrameRequest &request, Times &times) {
+void draw(TeamRenderer &renderer, Team &team, const FrameRequest &request, Times &times) {
   team.all_gather("");
   const auto begin = steady_clock::now();
   const FrameStats stats = renderer.render(request);
@@ -60,7 +60,7 @@ void draw(BrickRenderer &renderer, Team &team, const FrameRequest &request, Time
   times.composition.push_back(renderer.composition().ms - before);
 }
 
-std::map<std::string, Times> measure_frames(BrickRenderer &renderer, Team &team,
+std::map<std::string, Times> measure_frames(TeamRenderer &renderer, Team &team,
                                             const VolumeInfo &whole, const Options &options) {
   const std::vector<Camera> cameras = orbit_cameras(whole, options.orbit);
   const auto request_of = [&](std::uint32_t view, bool is_next) {
@@ -129,7 +129,7 @@ void measure(const Options &options, const std::string &command, Team &team) {
   const TeamVolume volume =
       open_together(team, source, [](std::vector<VolumeInfo> &levels) { levels.resize(1); });
   const BlockBox own = volume.cuts.bricks()[team.rank()];
-  std::optional<BrickRenderer> renderer;
+  std::optional<TeamRenderer> renderer;
   together(team, [&] {
     renderer.emplace(
         *device, volume,

@@ -21,7 +21,7 @@ using Pictures = std::vector<std::vector<HitRecord>>;
 
 /// Draws every view and the next one of each; whether no frame took more than max_passes. The first
 /// call fills `expected`; the pictures of all others must equal it.
-bool check_pictures(Renderer &renderer, const FrameReport &common,
+bool check_pictures(DeviceRenderer &renderer, const FrameReport &common,
                     const std::vector<Camera> &cameras, std::uint32_t max_passes,
                     Pictures &expected) {
   const bool first = expected.empty();
@@ -80,10 +80,9 @@ std::vector<std::uint64_t> geometric_budgets(const ocl::DeviceInfo &device_info,
                                              const CompressedVolume &volume,
                                              const RendererOptions &options, std::uint32_t count) {
   ocl::Device device(device_info);
-  const Renderer ample(device, volume, options);
+  const DeviceRenderer ample(device, volume, options);
   const RendererOptions &chosen = ample.options();
-  MemoryRequest request{chosen.size.num_rays(), chosen.pipeline, chosen.grouping,
-                        chosen.group_size};
+  MemoryRequest request{chosen.size.num_rays(), chosen.pipeline, chosen.group_size};
   std::uint64_t least = std::numeric_limits<std::uint64_t>::max();
   for (const StreamPlace place : {StreamPlace::kDevice, StreamPlace::kHost}) {
     if (options.stream != StreamPlace::kAuto && options.stream != place) continue;
@@ -117,7 +116,7 @@ BudgetSweep sweep_budgets(const ocl::DeviceInfo &device_info, const CompressedVo
   for (const std::uint64_t bytes : budgets) {
     options.memory_budget = bytes;
     ocl::Device device(device_info);
-    Renderer renderer(device, volume, options);
+    DeviceRenderer renderer(device, volume, options);
     BudgetTimes budget;
     budget.bytes = bytes;
     budget.cache_slots = renderer.options().cache_slots;

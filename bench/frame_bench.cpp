@@ -13,7 +13,7 @@
 #include "bench/frame_report.hpp"
 #include "bench/run_info.hpp"
 #include "core/base/error.hpp"
-#include "core/render/renderer.hpp"
+#include "core/render/device_renderer.hpp"
 #include "tools/isowave/outputs.hpp"
 #include "tools/isowave/program.hpp"
 #include "tools/isowave/render_stats.hpp"
@@ -56,7 +56,8 @@ CompressedVolume load(const Options &options, const ocl::DeviceInfo &device_info
 }
 
 /// Stage -> ms of a cold frame, for each view.
-std::vector<std::map<std::string, double>> measure_stages(ocl::Device &device, Renderer &renderer,
+std::vector<std::map<std::string, double>> measure_stages(ocl::Device &device,
+                                                          DeviceRenderer &renderer,
                                                           const std::vector<Camera> &cameras,
                                                           const FrameRequest &request) {
   renderer.render(seen_from(cameras.front(), request));
@@ -103,7 +104,7 @@ FrameReport measure(const Options &options, std::string command) {
   std::vector<HitRecord> first_hits;
   {
     ocl::Device device(device_info);
-    Renderer renderer(device, volume, report.options);
+    DeviceRenderer renderer(device, volume, report.options);
     report.run_info = run_info(device);
     report.options = renderer.options();
     report.setup_ms = renderer.setup_ms();
@@ -119,7 +120,7 @@ FrameReport measure(const Options &options, std::string command) {
   }
   {
     ocl::Device device(device_info, true);
-    Renderer renderer(device, volume, report.options);
+    DeviceRenderer renderer(device, volume, report.options);
     report.stage_clock = clock_name(device.timer().source());
     report.stage_ms = measure_stages(device, renderer, cameras, report.request());
   }

@@ -4,7 +4,7 @@
 #include <glm/gtc/quaternion.hpp>
 
 #include "core/base/error.hpp"
-#include "core/stages/resident.hpp"
+#include "core/paper/resident.hpp"
 
 namespace isowave::core::bench {
 
@@ -23,7 +23,7 @@ Camera turned(Camera camera) {
   return camera;
 }
 
-std::vector<ViewTimes> measure_views(Renderer &renderer, const std::vector<Camera> &cameras,
+std::vector<ViewTimes> measure_views(DeviceRenderer &renderer, const std::vector<Camera> &cameras,
                                      const FrameRequest &request, std::uint32_t rounds) {
   std::vector<ViewTimes> views(cameras.size());
   for (std::uint32_t round = 0; round < rounds; ++round) {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "core/render/renderer.hpp"
+#include "core/render/device_renderer.hpp"
 
 namespace isowave::core::bench {
 
@@ -30,12 +30,12 @@ Camera turned(Camera camera);
 /// request: its camera does not matter. The renderer must have drawn a frame of the isovalue
 /// before: a driver may compile a kernel when it first runs, and an isovalue's first frame finds
 /// its blocks.
-std::vector<ViewTimes> measure_views(Renderer &renderer, const std::vector<Camera> &cameras,
+std::vector<ViewTimes> measure_views(DeviceRenderer &renderer, const std::vector<Camera> &cameras,
                                      const FrameRequest &request, std::uint32_t rounds);
 
 double num_passes(const FrameStats &frame);
 
-/// Whole volume decoded, one kernel (core/stages/resident.hpp).
+/// Whole volume decoded, one kernel (core/paper/resident.hpp).
 struct FloorTimes {
   std::vector<std::vector<double>> ms;  ///< [views][rounds]; empty if not measured
   std::string why_not;                  ///< one line, if not measured

@@ -6,7 +6,7 @@
 #include <unordered_map>
 
 #include "bench/block_pairs.hpp"
-#include "core/stages/group.hpp"
+#include "core/paper/group.hpp"
 
 namespace isowave::core::bench {
 namespace {

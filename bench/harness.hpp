@@ -23,7 +23,7 @@
 #include <typeinfo>
 
 #include "core/ocl/device.hpp"
-#include "core/render/renderer.hpp"
+#include "core/render/device_renderer.hpp"
 
 namespace isowave::core::bench {
 

@@ -30,6 +30,7 @@
 #include "bench/peer_sides.hpp"
 #include "bench/run_info.hpp"
 #include "core/base/error.hpp"
+#include "core/paper/blocks_pipeline.hpp"
 #include "tools/isowave/outputs.hpp"
 #include "tools/isowave/program.hpp"
 #include "tools/isowave/render_stats.hpp"
@@ -73,7 +74,7 @@ std::unique_ptr<PeerSide> make_side(const Options &options, CompressedVolume vol
     return make_mesh_side(std::move(volume), camera, size, options.side == "mesh_medium");
   if (options.side == "host") return make_host_side(std::move(volume), camera, size);
   return make_renderer_side(std::move(volume), camera, size,
-                            options.side == "rays" ? PipelineKind::kRays : PipelineKind::kBlocks,
+                            options.side == "rays" ? rays_pipeline() : blocks_pipeline(),
                             options.device);
 }
 

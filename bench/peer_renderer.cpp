@@ -6,125 +6,95 @@
 #include "bench/frame_measure.hpp"
 #include "bench/peer_sides.hpp"
 #include "core/host/host_renderer.hpp"
-#include "core/render/renderer.hpp"
+#include "core/render/device_renderer.hpp"
 
 namespace isowave::core::bench {
 
 namespace {
 
-/// PeerSide::draw(). previous: the last isovalue, so that a new one's masks have to be made again.
-template <class Side>
-Measured measure(Side &side, const Camera &camera, float previous, float isovalue) {
-  Measured measured;
-  Stopwatch watch;
-  side.draw(camera, isovalue);
-  watch.lap(measured, "new_kept");
-  side.draw(camera, previous);
-  side.forget();
-  watch = {};
-  measured["hit_count"] = static_cast<double>(side.draw(camera, isovalue).rays_hit);
-  watch.lap(measured, "new");
-  side.draw(camera, isovalue);
-  watch.lap(measured, "warm");
-  side.draw(turned(camera), isovalue);
-  watch.lap(measured, "next");
-  return measured;
-}
-
-/// PeerSide::draw_views().
-template <class Side>
-std::vector<double> measure_views(Side &side, float previous, float isovalue,
-                                  const std::vector<Camera> &cameras) {
-  side.draw(cameras.at(0), previous);
-  side.forget();
-  std::vector<double> times;
-  for (const Camera &camera : cameras) {
-    Measured measured;
-    Stopwatch watch;
-    side.draw(camera, isovalue);
-    watch.lap(measured, "view");
-    times.push_back(measured.at("view_ms"));
-  }
-  return times;
-}
-
+/// A renderer of a device, or of the host. Like a mesh of triangles, frames have the normals that
+/// cells know.
 class RendererSide : public PeerSide {
  public:
-  RendererSide(const CompressedVolume &volume, const Camera &camera, ImageSize size,
-               PipelineKind pipeline, const std::string &device)
-      : camera_(camera),
-        device_(ocl::choose_device(device)),
-        renderer_(device_, volume, {.size = size, .pipeline = pipeline}) {}
-
-  Measured draw(float isovalue) override {
-    Measured measured = measure(*this, camera_, previous_, isovalue);
-    measured["device_byte_count"] = static_cast<double>(device_.ledger().peak());
-    previous_ = isovalue;
-    return measured;
+  /// On a device.
+  RendererSide(CompressedVolume volume, const Camera &camera, ImageSize size, PipelinePtr pipeline,
+               const std::string &device)
+      : volume_(std::move(volume)), camera_(camera), size_(size) {
+    device_.emplace(ocl::choose_device(device));
+    renderer_ = std::make_unique<DeviceRenderer>(
+        *device_, volume_, RendererOptions{.size = size, .pipeline = std::move(pipeline)});
   }
-  std::vector<double> draw_views(float isovalue, const std::vector<Camera> &cameras) override {
-    return measure_views(*this, previous_, isovalue, cameras);
-  }
-
-  void forget() { renderer_.clear_cache(); }
-  /// Like a mesh of triangles, with what a cell knows.
-  FrameStats draw(const Camera &camera, float isovalue) {
-    return renderer_.render({.camera = camera, .isovalue = isovalue, .normals = Normals::kCell});
-  }
-
- private:
-  Camera camera_;
-  float previous_ = 0;
-  ocl::Device device_;
-  Renderer renderer_;
-};
-
-class HostSide : public PeerSide {
- public:
-  HostSide(CompressedVolume volume, const Camera &camera, ImageSize size)
+  /// On the host.
+  RendererSide(CompressedVolume volume, const Camera &camera, ImageSize size)
       : volume_(std::move(volume)), camera_(camera), size_(size) {
     Stopwatch watch;
-    renderer_.emplace(volume_);
+    renderer_ = std::make_unique<HostRenderer>(volume_);
     watch.lap(opened_, "open");
   }
 
   Measured draw(float isovalue) override {
-    Measured measured = measure(*this, camera_, previous_, isovalue);
-    measured.insert(opened_.begin(), opened_.end());
-    measured["renderer_byte_count"] = static_cast<double>(renderer_->memory_bytes());
+    Measured measured = opened_;
+    Stopwatch watch;
+    draw(camera_, isovalue);
+    watch.lap(measured, "new_kept");
+    draw(camera_, previous_);
+    renderer_->clear_cache();
+    watch = {};
+    measured["hit_count"] = static_cast<double>(draw(camera_, isovalue).rays_hit);
+    watch.lap(measured, "new");
+    draw(camera_, isovalue);
+    watch.lap(measured, "warm");
+    draw(turned(camera_), isovalue);
+    watch.lap(measured, "next");
+    if (device_) {
+      measured["device_byte_count"] = static_cast<double>(device_->ledger().peak());
+    } else {
+      measured["renderer_byte_count"] = static_cast<double>(renderer_->memory_bytes());
+    }
     previous_ = isovalue;
     return measured;
   }
   std::vector<double> draw_views(float isovalue, const std::vector<Camera> &cameras) override {
-    return measure_views(*this, previous_, isovalue, cameras);
+    draw(cameras.at(0), previous_);
+    renderer_->clear_cache();
+    std::vector<double> times;
+    for (const Camera &camera : cameras) {
+      Measured measured;
+      Stopwatch watch;
+      draw(camera, isovalue);
+      watch.lap(measured, "view");
+      times.push_back(measured.at("view_ms"));
+    }
+    return times;
   }
 
-  void forget() { renderer_->clear_cache(); }
+ private:
   FrameStats draw(const Camera &camera, float isovalue) {
     return renderer_->render(
         {.camera = camera, .isovalue = isovalue, .size = size_, .normals = Normals::kCell});
   }
 
- private:
   CompressedVolume volume_;
   Camera camera_;
-  float previous_ = 0;
   ImageSize size_;
+  /// Of the last frame, so that a new isovalue's masks have to be made again.
+  float previous_ = 0;
   Measured opened_;
-  std::optional<HostRenderer> renderer_;
+  std::optional<ocl::Device> device_;  ///< before the renderer, which it must outlive
+  std::unique_ptr<Renderer> renderer_;
 };
 
 }  // namespace
 
 std::unique_ptr<PeerSide> make_host_side(CompressedVolume volume, const Camera &camera,
                                          ImageSize size) {
-  return std::make_unique<HostSide>(std::move(volume), camera, size);
+  return std::make_unique<RendererSide>(std::move(volume), camera, size);
 }
 
 std::unique_ptr<PeerSide> make_renderer_side(CompressedVolume volume, const Camera &camera,
-                                             ImageSize size, PipelineKind pipeline,
+                                             ImageSize size, PipelinePtr pipeline,
                                              const std::string &device) {
-  return std::make_unique<RendererSide>(volume, camera, size, pipeline, device);
+  return std::make_unique<RendererSide>(std::move(volume), camera, size, std::move(pipeline), device);
 }
 
 }  // namespace isowave::core::bench

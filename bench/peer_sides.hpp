@@ -66,7 +66,7 @@ std::unique_ptr<PeerSide> make_mesh_side(CompressedVolume volume, const Camera &
 /// Our renderer on the device that is chosen. new_ms: with nothing decoded; new_kept_ms: with the
 /// cache as the isovalue before left it.
 std::unique_ptr<PeerSide> make_renderer_side(CompressedVolume volume, const Camera &camera,
-                                             ImageSize size, PipelineKind pipeline,
+                                             ImageSize size, PipelinePtr pipeline,
                                              const std::string &device);
 
 /// Our renderer without OpenCL, on all processors: new_ms and new_kept_ms as above. open_ms: the

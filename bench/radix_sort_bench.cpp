@@ -5,7 +5,7 @@
 
 #include "bench/harness.hpp"
 #include "bench/scenes.hpp"
-#include "core/stages/radix_sort.hpp"
+#include "core/paper/radix_sort.hpp"
 
 namespace isowave::core::bench {
 namespace {

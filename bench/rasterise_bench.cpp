@@ -4,7 +4,7 @@
 
 #include "bench/harness.hpp"
 #include "bench/scenes.hpp"
-#include "core/extract/mesh_renderer.hpp"
+#include "core/paper/mesh_renderer.hpp"
 
 namespace isowave::core::bench {
 namespace {

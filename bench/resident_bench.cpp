@@ -2,7 +2,7 @@
 
 #include "bench/frame_rig.hpp"
 #include "bench/scenes.hpp"
-#include "core/stages/resident.hpp"
+#include "core/paper/resident.hpp"
 #include "reference/scalar_renderer.hpp"
 
 namespace isowave::core::bench {

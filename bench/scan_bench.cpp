@@ -5,7 +5,7 @@
 
 #include "bench/harness.hpp"
 #include "bench/scenes.hpp"
-#include "core/stages/scan.hpp"
+#include "core/paper/scan.hpp"
 
 namespace isowave::core::bench {
 namespace {

@@ -1,7 +1,7 @@
 #include "reference/raster_twin.hpp"
 
 #include "core/base/parallel_for.hpp"
-#include "core/stages/rasterise.hpp"
+#include "core/paper/rasterise.hpp"
 #include "kernels_cl/portable/raster.h"
 #include "reference/mesh_twin.hpp"
 

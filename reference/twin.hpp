@@ -18,7 +18,7 @@ class Twin {
   /// Decodes the volume, and its coarser levels where voxel_pixels is not 0. The arguments are
   /// those of FrameRequest.
   ///
-  /// Throws  Error as Renderer does
+  /// Throws  Error as DeviceRenderer does
   explicit Twin(const CompressedVolume &volume, double voxel_pixels = 0, double voxel_error = 0,
                 FieldBound bound = FieldBound::kNone);
 

@@ -145,7 +145,7 @@ void judge_view(const GridLevels &levels, const RandomView &view,
 
 }  // namespace
 
-std::vector<WatertightResult> run_watertight_on(ocl::Device &device, PipelineKind pipeline,
+std::vector<WatertightResult> run_watertight_on(ocl::Device &device, const PipelinePtr &pipeline,
                                                 std::uint64_t num_rays, std::uint32_t seed,
                                                 Solver solver, RayBands bands, RayPackets packets) {
   const bool with_levels = bands == RayBands::kLevels;
@@ -155,14 +155,14 @@ std::vector<WatertightResult> run_watertight_on(ocl::Device &device, PipelineKin
     const CompressedVolume volume =
         compress(reader, CompressOptions{.rate = 16, .levels = with_levels ? kNumLevels : 1});
     const GridLevels levels = decoded_levels(volume, with_levels);
-    Renderer renderer(device, volume,
-                      {.size = {kPicture, kPicture},
-                       .pipeline = pipeline,
-                       .cache_slots = kCacheSlots,
-                       .solver = solver,
-                       .packets = packets,
-                       .with_levels = with_levels,
-                       .with_shading = false});
+    DeviceRenderer renderer(device, volume,
+                            {.size = {kPicture, kPicture},
+                             .pipeline = pipeline,
+                             .cache_slots = kCacheSlots,
+                             .solver = solver,
+                             .packets = packets,
+                             .with_levels = with_levels,
+                             .with_shading = false});
     WatertightResult result{surface.name + std::string(with_levels ? ", levels" : "")};
     Random random(seed);
     for (std::uint64_t view_id = 0; result.rays < num_rays; ++view_id) {

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/render/renderer.hpp"
+#include "core/render/device_renderer.hpp"
 #include "reference/watertight.hpp"
 
 namespace isowave::core {
@@ -16,7 +16,7 @@ namespace isowave::core {
 /// those that pass an inside point, before which they must. A third of the views stand at lattice
 /// points and look along lattice directions. kLevels: with borders anywhere in the surface,
 /// pipeline `rays` alone.
-std::vector<WatertightResult> run_watertight_on(ocl::Device &device, PipelineKind pipeline,
+std::vector<WatertightResult> run_watertight_on(ocl::Device &device, const PipelinePtr &pipeline,
                                                 std::uint64_t num_rays, std::uint32_t seed,
                                                 Solver solver, RayBands bands = RayBands::kOne,
                                                 RayPackets packets = RayPackets::kAuto);

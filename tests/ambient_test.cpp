@@ -10,9 +10,9 @@
 #include <set>
 
 #include "core/base/error.hpp"
+#include "core/frame/timed_renderer.hpp"
 #include "core/host/host_renderer.hpp"
-#include "core/render/renderer.hpp"
-#include "core/render/time_budget.hpp"
+#include "core/render/device_renderer.hpp"
 #include "core/view/detail.hpp"
 #include "reference/random.hpp"
 #include "reference/twin.hpp"
@@ -179,7 +179,7 @@ class AmbientOnDevice : public testing::TestWithParam<PipelineOnDevice> {
     options.with_given_rays = true;
     options.with_levels = voxel_pixels > 0;
     const Twin twin(volume, voxel_pixels);
-    Renderer renderer(device_, volume, GetParam().with(options));
+    DeviceRenderer renderer(device_, volume, GetParam().with(options));
     for (const Camera &camera : cameras) {
       const auto hits = twin.render(camera, options.size, kIsovalue);
       const OpenCounts open = twin.open(camera, options.size, kIsovalue, hits, num_rays);
@@ -233,7 +233,7 @@ TEST_P(AmbientOnDevice, FramesWithHardlyAnyMemory) {
 }
 
 TEST_P(AmbientOnDevice, FramesOfSeveralLevels) {
-  if (GetParam().pipeline == PipelineKind::kBlocks) GTEST_SKIP() << "draws one level";
+  if (!GetParam().pipeline->has_levels()) GTEST_SKIP() << "draws one level";
   const glm::uvec3 dims(50, 44, 60);
   ArrayReader reader(test::grid_info(dims), test::sample(dims, test::gyroid_field(14)));
   const CompressedVolume volume = compress(reader, CompressOptions{.rate = 8, .levels = 0});
@@ -249,8 +249,9 @@ TEST_P(AmbientOnDevice, CancelledRoundsLeaveNoTrace) {
   const auto cameras = orbit_cameras(volume.info(), 2);
   const auto next = test::twin_hits(volume, cameras[1], kFrame, 0.1f);
   const auto hits = test::twin_hits(volume, cameras[0], kFrame, kIsovalue);
-  Renderer renderer(device_, volume.compressed,
-                    GetParam().with({.size = kFrame, .cache_slots = 60, .with_given_rays = true}));
+  DeviceRenderer renderer(
+      device_, volume.compressed,
+      GetParam().with({.size = kFrame, .cache_slots = 60, .with_given_rays = true}));
   FrameRequest request{.camera = cameras[0], .isovalue = kIsovalue, .ambient_rays = 3};
   const FrameStats whole = renderer.render(request);
   const std::uint32_t before = std::uint32_t(whole.passes.size()) + whole.normals.passes;
@@ -278,19 +279,19 @@ TEST_P(AmbientOnDevice, CancelledRoundsLeaveNoTrace) {
 TEST_P(AmbientOnDevice, PicturesWithinATimeHaveThemWhenWhole) {
   const TestVolume volume = volume_of_test();
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
-  Renderer renderer(
+  DeviceRenderer renderer(
       device_, volume.compressed,
       GetParam().with({.size = kFrame, .with_kept_picture = true, .with_given_rays = true}));
   const FrameRequest request{.camera = camera, .isovalue = kIsovalue, .ambient_rays = 3};
   renderer.render(request);
   const Image8 whole = renderer.shade();
-  TimedFrames frames(renderer);
-  const TimedFrame drawn = frames.render(request, 1e9);
+  TimedRenderer frames(renderer);
+  const FrameStats drawn = frames.render(within_ms(1e9, request));
   EXPECT_TRUE(drawn.complete);
   EXPECT_EQ(renderer.shade().pixels, whole.pixels);
-  EXPECT_GT(drawn.stats.ambient.passes, 0u);
-  TimedFrames hurried(renderer);
-  EXPECT_EQ(hurried.render(request, 1e-6).stats.ambient.passes, 0u);
+  EXPECT_GT(drawn.ambient.passes, 0u);
+  TimedRenderer hurried(renderer);
+  EXPECT_EQ(hurried.render(within_ms(1e-6, request)).ambient.passes, 0u);
   EXPECT_EQ(renderer.open().num_ambient, 0u) << "of an enlarged picture";
 }
 
@@ -309,8 +310,9 @@ TEST_P(AmbientOnDevice, RaysOfAnyOriginHitWhatTheHostFinds) {
     rays.push_back({glm::dvec3(12.5), -direction});
   }
   // More rays than the picture has, of a cache that a part of them turns over.
-  Renderer renderer(device_, volume.compressed,
-                    GetParam().with({.size = kFrame, .cache_slots = 200, .with_given_rays = true}));
+  DeviceRenderer renderer(
+      device_, volume.compressed,
+      GetParam().with({.size = kFrame, .cache_slots = 200, .with_given_rays = true}));
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
   renderer.render({.camera = camera, .isovalue = 0.1f, .ambient_rays = 2});
   const Image8 picture = renderer.shade();
@@ -329,13 +331,13 @@ TEST_P(AmbientOnDevice, RaysOfAnyOriginHitWhatTheHostFinds) {
 TEST_P(AmbientOnDevice, SmallMistakesAreOneLine) {
   const TestVolume volume({9, 9, 9}, test::gyroid_field(6));
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
-  Renderer without(device_, volume.compressed, GetParam().with({.size = {4, 4}}));
+  DeviceRenderer without(device_, volume.compressed, GetParam().with({.size = {4, 4}}));
   EXPECT_THAT([&] { without.render({.camera = camera, .isovalue = 0, .ambient_rays = 1}); },
-              testing::ThrowsMessage<Error>(HasSubstr("made without given rays")));
+              testing::ThrowsMessage<Error>(HasSubstr("made with_rays")));
   EXPECT_THAT([&] { without.cast_rays({}, 0, Normals::kCell); },
-              testing::ThrowsMessage<Error>(HasSubstr("made without given rays")));
-  Renderer renderer(device_, volume.compressed,
-                    GetParam().with({.size = {4, 4}, .with_given_rays = true}));
+              testing::ThrowsMessage<Error>(HasSubstr("made with_rays")));
+  DeviceRenderer renderer(device_, volume.compressed,
+                          GetParam().with({.size = {4, 4}, .with_given_rays = true}));
   EXPECT_THAT([&] { renderer.render({.camera = camera, .isovalue = 0, .ambient_rays = 256}); },
               testing::ThrowsMessage<Error>(HasSubstr("too many")));
   EXPECT_THAT([&] { renderer.cast_rays({}, NAN, Normals::kCell); },

@@ -1,4 +1,4 @@
-// isowave::BrickRenderer: threads in the place of processes draw together what one renderer draws.
+// make_team_renderer(): threads in the place of processes draw together what one renderer draws.
 // tools/python/tests/test_bricks.py has real ones.
 
 #include <gmock/gmock.h>
@@ -64,7 +64,8 @@ TEST(ApiBricks, DrawWhatOneRendererDraws) {
   request.camera = whole.camera(40);
   const Frame expected = whole.render(request);
   in_threads([&](Processes &processes, std::uint32_t rank) {
-    BrickRenderer renderer(processes, kFuel, exact, {}, {.renderer = {.largest = {48, 32}}});
+    Renderer renderer =
+        make_team_renderer(processes, kFuel, exact, {}, {.renderer = {.largest = {48, 32}}});
     FrameRequest own = request;
     own.camera = renderer.camera(40);
     EXPECT_EQ(own.camera.eye, request.camera.eye);
@@ -91,7 +92,8 @@ TEST(ApiBricks, BoundsOfOneRenderer) {
   const Frame expected = whole.render(request);
   EXPECT_GT(expected.detail.value().voxel_error, 0) << "bit planes are left out";
   in_threads([&](Processes &processes, std::uint32_t rank) {
-    BrickRenderer renderer(processes, kFuel, {.rate = 20}, {}, {.renderer = options});
+    Renderer renderer =
+        make_team_renderer(processes, kFuel, {.rate = 20}, {}, {.renderer = options});
     const Frame frame = renderer.render(request);
     EXPECT_EQ(frame.bounds, rank == 0 ? expected.bounds : std::vector<float>());
     EXPECT_EQ(frame.picture, rank == 0 ? expected.picture : std::vector<std::uint8_t>());
@@ -106,7 +108,8 @@ TEST(ApiBricks, BoundsOfOneRenderer) {
 /// A call of the renderer that waits for them.
 TEST(ApiBricks, CallsFromItsOwnProcessesAreRefused) {
   in_threads([](ThreadProcess &processes, std::uint32_t) {
-    BrickRenderer renderer(processes, kFuel, {}, {}, {.renderer = {.largest = {16, 16}}});
+    Renderer renderer =
+        make_team_renderer(processes, kFuel, {}, {}, {.renderer = {.largest = {16, 16}}});
     FrameRequest request{.isovalue = 40, .size = {16, 16}};
     request.camera = renderer.camera(40);
     std::string error;
@@ -135,7 +138,7 @@ TEST(ApiBricks, WhatGoesWrongIsThrownAtAll) {
       }
     };
     const auto make = [&](const std::string &path, const BrickOptions &options) {
-      return BrickRenderer(processes, path, {}, {}, options);
+      return make_team_renderer(processes, path, {}, {}, options);
     };
     const BrickOptions small{.renderer = {.largest = {16, 16}}};
     expect_error([&] { make(rank == 1 ? "nowhere.zfp" : kFuel, small); }, "rank 1: nowhere.zfp");
@@ -144,12 +147,11 @@ TEST(ApiBricks, WhatGoesWrongIsThrownAtAll) {
           make(kFuel, {.renderer = {.largest = {16 + rank, 16}}});
         },
         "rank 1 has another request");
-    expect_error([&] { make(kFuel, {.renderer = {.with_time_budget = true}}); }, "no time budget");
-    BrickRenderer renderer = make(kFuel, small);
+    Renderer renderer = make(kFuel, small);
     FrameRequest request{.isovalue = 40, .size = {16, 16}};
     request.camera = renderer.camera(40);
     request.want_positions = true;
-    expect_error([&] { renderer.render(request); }, "no positions");
+    expect_error([&] { renderer.render(request); }, "leave out want_positions");
     request.want_positions = false;
     request.want_bounds = true;
     expect_error([&] { renderer.render(request); }, "made with_bounds");
@@ -158,6 +160,30 @@ TEST(ApiBricks, WhatGoesWrongIsThrownAtAll) {
     expect_error([&] { renderer.render(request); }, "rank 1 has another request");
     request.isovalue = 40;
     EXPECT_EQ(renderer.render(request).picture.size(), rank == 0 ? 3u * 16 * 16 : 0u);
+  });
+}
+
+TEST(ApiBricks, PicturesWithinATimeAndPassByPass) {
+  in_threads([](Processes &processes, std::uint32_t rank) {
+    Renderer renderer = make_team_renderer(
+        processes, kFuel, {}, {}, {.renderer = {.largest = {48, 32}, .with_time_budget = true}});
+    FrameRequest request{.camera = renderer.camera(40), .isovalue = 40, .size = {48, 32}};
+    const std::vector<std::uint8_t> whole = renderer.render(request).picture;
+    std::uint32_t passes = 0;
+    request.on_pass = [&](const Progress &progress) {
+      ++passes;
+      EXPECT_EQ(progress.picture().size(), rank == 0 ? 3u * 48 * 32 : 0u);
+      return true;
+    };
+    EXPECT_EQ(renderer.render(request).picture, whole);
+    EXPECT_GT(passes, 0u);
+    request.on_pass = {};
+    request.time_budget_ms = 1e6;
+    const Frame in_time = renderer.render(request);
+    EXPECT_TRUE(in_time.statistics.complete);
+    EXPECT_EQ(in_time.picture, whole);
+    request.time_budget_ms = 1e-6;
+    EXPECT_FALSE(renderer.render(request).statistics.complete);
   });
 }
 

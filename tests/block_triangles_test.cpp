@@ -1,7 +1,7 @@
-// core/stages/block_triangles against its scalar twin, bit for bit; its vertices against those of
+// core/paper/block_triangles against its scalar twin, bit for bit; its vertices against those of
 // meshes that share them.
 
-#include "core/stages/block_triangles.hpp"
+#include "core/paper/block_triangles.hpp"
 
 #include <gtest/gtest.h>
 

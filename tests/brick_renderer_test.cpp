@@ -1,7 +1,7 @@
 // Teams of threads that draw a volume's bricks together, each on a device of its own: pictures pass
 // by pass, within a time, within an error, with ambient rays; and what they do where one fails.
 
-#include "core/bricks/brick_renderer.hpp"
+#include "core/bricks/team_renderer.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,10 +10,13 @@
 #include <functional>
 #include <thread>
 
-#include "core/accuracy/choose_detail.hpp"
+#include "core/accuracy/bounded_renderer.hpp"
+#include "core/accuracy/certify.hpp"
 #include "core/base/error.hpp"
 #include "core/bricks/brick_volume.hpp"
 #include "core/bricks/ranks.hpp"
+#include "core/frame/timed_renderer.hpp"
+#include "core/view/detail.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/test_devices.hpp"
 #include "tests/thread_meeting.hpp"
@@ -55,7 +58,7 @@ class BrickTeamOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
       GTEST_SKIP() << "each thread compiles all kernels, which takes llvmpipe minutes";
   }
 
-  using Work = std::function<void(BrickRenderer &renderer, std::uint32_t rank)>;
+  using Work = std::function<void(TeamRenderer &renderer, std::uint32_t rank)>;
 
   /// Each rank of a team does this with its brick.
   void on_ranks(std::uint32_t size, const RendererOptions &options, const Work &work) {
@@ -67,7 +70,7 @@ class BrickTeamOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
         ThreadTeam team(meeting, rank);
         ocl::Device device(GetParam());
         const CompressedVolume brick = cut_brick(volume_.compressed, cuts.bricks()[rank]);
-        BrickRenderer renderer(device, brick, options, cuts, {volume_.info()}, team);
+        TeamRenderer renderer(device, brick, options, cuts, {volume_.info()}, team);
         work(renderer, rank);
       });
     }
@@ -76,7 +79,7 @@ class BrickTeamOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
   /// What one renderer draws.
   Image8 picture_of_one(const FrameRequest &request, const RendererOptions &options) {
     ocl::Device device(GetParam());
-    Renderer renderer(device, volume_.compressed, options);
+    DeviceRenderer renderer(device, volume_.compressed, options);
     renderer.render(request);
     return renderer.shade();
   }
@@ -102,10 +105,10 @@ TEST_P(BrickTeamOnDevice, BrickOfAVolumeWithMoreBlocksThanIds) {
   test::ThreadMeeting meeting(1);
   ThreadTeam team(meeting, 0);
   ocl::Device device(GetParam());
-  BrickRenderer renderer(device, volume.compressed, {.size = kFrame}, cuts, {whole}, team);
+  TeamRenderer renderer(device, volume.compressed, {.size = kFrame}, cuts, {whole}, team);
   renderer.render({.camera = camera, .isovalue = kIsovalue});
   EXPECT_EQ(renderer.depth(), depth_of(test::twin_hits(volume, camera, kFrame, kIsovalue)));
-  EXPECT_GT(renderer.num_hits(), 200u);
+  EXPECT_GT(renderer.num_hits({}), 200u);
 }
 
 /// Rank 0 of a team whose others have drawn nothing.
@@ -127,12 +130,12 @@ TEST_P(BrickTeamOnDevice, AWordForEachColourOfManyBricks) {
     ocl::Device device(GetParam());
     FrameRequest request = request_;
     request.camera = camera_along({-20, -18, -16}, {0.6, 0.5, 0.5});
-    Renderer alone(device, brick, {.size = kFrame});
+    DeviceRenderer alone(device, brick, {.size = kFrame});
     alone.render(request);
-    BrickRenderer renderer(device, brick, {.size = kFrame}, cuts, {volume_.info()}, team);
+    TeamRenderer renderer(device, brick, {.size = kFrame}, cuts, {volume_.info()}, team);
     renderer.render(request);
     EXPECT_EQ(renderer.shade({}).pixels, alone.shade().pixels);
-    EXPECT_GT(renderer.num_hits(), 0u);
+    EXPECT_GT(renderer.num_hits({}), 0u);
     const std::uint64_t rays = kFrame.num_rays();
     EXPECT_EQ(renderer.composition().bytes, size == 255 ? 8 * ((rays + 1) / 2) : 8 * rays);
   }
@@ -156,7 +159,7 @@ TEST_P(BrickTeamOnDevice, PicturesPassByPass) {
     std::vector<std::size_t> num_calls(3), num_passes(3);
     std::vector<Image8> images;
     Image8 last;
-    on_ranks(3, options, [&](BrickRenderer &renderer, std::uint32_t rank) {
+    on_ranks(3, options, [&](TeamRenderer &renderer, std::uint32_t rank) {
       FrameRequest request = request_;
       request.on_pass = [&](const PassStats &) {
         ++num_calls[rank];
@@ -185,7 +188,7 @@ TEST_P(BrickTeamOnDevice, PicturesPassByPass) {
 TEST_P(BrickTeamOnDevice, AllStopInTheSamePass) {
   const RendererOptions options{.size = kFrame, .cache_slots = 60};
   const Image8 whole = picture_of_one(request_, options);
-  on_ranks(3, options, [&](BrickRenderer &renderer, std::uint32_t rank) {
+  on_ranks(3, options, [&](TeamRenderer &renderer, std::uint32_t rank) {
     FrameRequest request = request_;
     int calls = 0;
     request.on_pass = [&](const PassStats &) { return ++calls < 3; };
@@ -204,7 +207,7 @@ TEST_P(BrickTeamOnDevice, AllStopInTheSamePass) {
 TEST_P(BrickTeamOnDevice, WhereOneFailsAllDo) {
   const RendererOptions options{.size = kFrame, .cache_slots = 60, .with_given_rays = true};
   const Image8 whole = picture_of_one(request_, options);
-  on_ranks(3, options, [&](BrickRenderer &renderer, std::uint32_t rank) {
+  on_ranks(3, options, [&](TeamRenderer &renderer, std::uint32_t rank) {
     for (const bool in_ambient : {false, true}) {
       FrameRequest request = request_;
       request.ambient_rays = 2;
@@ -237,7 +240,7 @@ TEST_P(BrickTeamOnDevice, AmbientRays) {
     const ImageSize size{kFrame.width, kFrame.height, samples};
     const RendererOptions options{.size = size, .with_given_rays = true};
     const Image8 whole = picture_of_one(request_, options);
-    on_ranks(4, options, [&](BrickRenderer &renderer, std::uint32_t rank) {
+    on_ranks(4, options, [&](TeamRenderer &renderer, std::uint32_t rank) {
       for (const bool in_step : {false, true}) {
         FrameRequest request = request_;
         std::size_t calls = 0;
@@ -257,7 +260,7 @@ TEST_P(BrickTeamOnDevice, AmbientRays) {
         EXPECT_EQ(image.pixels, whole.pixels);
         EXPECT_EQ(
             std::uint64_t(std::ranges::count_if(depth, [](float t) { return std::isfinite(t); })),
-            renderer.num_hits());
+            renderer.num_hits({}));
       }
     });
   }
@@ -267,12 +270,11 @@ TEST_P(BrickTeamOnDevice, PicturesWithinATime) {
   request_.ambient_rays = 2;
   const RendererOptions options{.size = kFrame, .with_kept_picture = true, .with_given_rays = true};
   const Image8 whole = picture_of_one(request_, options);
-  on_ranks(3, options, [&](BrickRenderer &renderer, std::uint32_t rank) {
-    const TimedFrame hurried = renderer.render_within(request_, 1e-6);
-    EXPECT_FALSE(hurried.complete);
+  on_ranks(3, options, [&](TeamRenderer &renderer, std::uint32_t rank) {
+    TimedRenderer timed(renderer);
+    EXPECT_FALSE(timed.render(within_ms(1e-6, request_)).complete);
     const Image8 coarse = renderer.shade({});
-    const TimedFrame frame = renderer.render_within(request_, 1e9);
-    EXPECT_TRUE(frame.complete);
+    EXPECT_TRUE(timed.render(within_ms(1e9, request_)).complete);
     const Image8 image = renderer.shade({});
     if (rank != 0) return;
     EXPECT_EQ(image.pixels, whole.pixels);
@@ -293,13 +295,17 @@ struct BoundedFrame {
   Certificate certificate;
 };
 
-BoundedFrame draw_within(BoundedFrames &frames, const BoundedCase &of) {
+/// volume: that this process's renderer was made for.
+BoundedFrame draw_within(Renderer &renderer, const CompressedVolume &volume, double rate,
+                         const BoundedCase &of) {
+  BoundedRenderer bounded(renderer, volume, rate);
+  FrameRequest request = of.request;
+  request.max_surface_error = of.max_surface_error;
   BoundedFrame frame;
-  frame.choice = choose_detail(frames, of.request, of.max_surface_error);
-  const FrameRequest request = with_detail(of.request, frame.choice.detail);
-  frames.draw(request);
-  frame.depth = frames.depth();
-  frame.certificate = certify(frames, request, frame.depth);
+  frame.choice = bounded.render(request).detail.value();
+  frame.depth = bounded.depth();
+  frame.certificate = certify(renderer, volume, with_detail(of.request, frame.choice.detail),
+                              std::span<const float>(frame.depth));
   return frame;
 }
 
@@ -331,10 +337,9 @@ void expect_by_team(std::uint32_t size, const CompressedVolume &volume,
     CompressedVolume brick = cut_brick(volume, cuts.bricks()[rank], num_levels);
     const double rate = agree_on_voxels(team, brick);
     EXPECT_EQ(rate, volume.rate());
-    BrickRenderer renderer(device, brick, options, cuts, levels, team);
-    FramesOfTeam frames(renderer, brick, rate);
+    TeamRenderer renderer(device, brick, options, cuts, levels, team);
     for (std::size_t i = 0; i < cases.size(); ++i) {
-      const BoundedFrame frame = draw_within(frames, cases[i]);
+      const BoundedFrame frame = draw_within(renderer, brick, rate, cases[i]);
       EXPECT_EQ(text_of(frame.choice), text_of(expected[i].choice));
       EXPECT_EQ(frame.depth, rank == 0 ? expected[i].depth : std::vector<float>());
       EXPECT_EQ(frame.certificate.bounds,
@@ -343,7 +348,7 @@ void expect_by_team(std::uint32_t size, const CompressedVolume &volume,
     if (num_levels == levels.size()) return;
     FrameRequest coarse = cases[0].request;
     coarse.voxel_pixels = 1000;
-    EXPECT_THAT([&] { frames.draw(coarse); },
+    EXPECT_THAT([&] { renderer.render(coarse); },
                 testing::ThrowsMessage<Error>(testing::HasSubstr("convert with --levels")));
   };
   std::vector<std::jthread> threads;
@@ -375,10 +380,9 @@ TEST_P(BrickTeamOnDevice, WithinAnError) {
     std::vector<BoundedFrame> expected;
     {
       ocl::Device device(GetParam());
-      Renderer renderer(device, volume, options);
-      FramesOfOne frames(renderer, volume);
+      DeviceRenderer renderer(device, volume, options);
       for (const BoundedCase &each : cases) {
-        expected.push_back(draw_within(frames, each));
+        expected.push_back(draw_within(renderer, volume, volume.rate(), each));
         most_pixels = std::max(most_pixels, expected.back().choice.detail.voxel_pixels);
         most_error = std::max(most_error, expected.back().choice.detail.voxel_error);
       }

@@ -16,7 +16,7 @@
 #include "core/bricks/compose.hpp"
 #include "core/bricks/cuts.hpp"
 #include "core/bricks/surface_work.hpp"
-#include "core/render/renderer.hpp"
+#include "core/render/device_renderer.hpp"
 #include "core/volume/range_thresholds.hpp"
 #include "kernels_cl/portable/block_cells.h"
 #include "reference/twin.hpp"
@@ -61,7 +61,7 @@ class BricksOnDevice : public testing::TestWithParam<PipelineOnDevice> {
          std::vector<std::uint64_t>(num_rays)});
     for (std::size_t brick = 0; brick < cuts.bricks().size(); ++brick) {
       const CompressedVolume volume = cut_brick(whole.compressed, cuts.bricks()[brick]);
-      Renderer renderer(device_, volume, options);
+      DeviceRenderer renderer(device_, volume, options);
       for (std::size_t view = 0; view < cameras.size(); ++view) {
         Composed &frame = frames[view];
         renderer.render({.camera = cameras[view], .isovalue = isovalue});
@@ -84,7 +84,7 @@ class BricksOnDevice : public testing::TestWithParam<PipelineOnDevice> {
       }
     }
     std::uint64_t num_hits = 0;
-    Renderer renderer(device_, whole.compressed, options);
+    DeviceRenderer renderer(device_, whole.compressed, options);
     for (std::size_t view = 0; view < cameras.size(); ++view) {
       SCOPED_TRACE(fmt::format("view {}", view));
       const Composed &frame = frames[view];
@@ -162,7 +162,7 @@ TEST_P(BricksOnDevice, OneBlockEachInTightCaches) {
 TEST_P(BricksOnDevice, SameActiveBlocks) {
   const TestVolume volume({21, 18, 17}, test::sphere_field({21, 18, 17}));
   const RendererOptions options = GetParam().with({.size = {9, 7}});
-  Renderer whole(device_, volume.compressed, options);
+  DeviceRenderer whole(device_, volume.compressed, options);
   const Cuts cuts(blocks_along(volume.info()), 3);
   std::vector<float> samples;
   for (const BlockBox &own : cuts.bricks()) {
@@ -176,7 +176,7 @@ TEST_P(BricksOnDevice, SameActiveBlocks) {
   BlockBox box{glm::ivec3(99), glm::ivec3(-1)};
   for (const BlockBox &own : cuts.bricks()) {
     const CompressedVolume brick = cut_brick(volume.compressed, own);
-    Renderer renderer(device_, brick, of_brick);
+    DeviceRenderer renderer(device_, brick, of_brick);
     const std::optional<BlockBox> active = renderer.surface_box(isovalues);
     ASSERT_TRUE(active);
     const glm::ivec3 first(brick.info.brick.first_voxel / 4u);
@@ -194,7 +194,7 @@ TEST_P(BricksOnDevice, SameActiveBlocks) {
 /// Bands of several levels of detail, whose borders lie in bricks and on cuts. Other kinds of a
 /// pipeline have the same kernels there.
 TEST_P(BricksOnDevice, LevelsOfDetail) {
-  if (GetParam().pipeline == PipelineKind::kBlocks) return;  // draws the finest level alone
+  if (!GetParam().pipeline->has_levels()) return;  // draws the finest level alone
   const VolumeInfo info = test::grid_info({41, 37, 33});
   ArrayReader reader(info, test::sample(info.dims, test::noise_field(6)));
   constexpr std::size_t kLevels = 3;
@@ -203,7 +203,7 @@ TEST_P(BricksOnDevice, LevelsOfDetail) {
   const ImageSize size{49, 33};
   RendererOptions options = GetParam().with({.size = size});
   options.with_levels = true;
-  Renderer of_whole(device_, whole, options);
+  DeviceRenderer of_whole(device_, whole, options);
   const std::vector<Camera> cameras = views_of(info, {16, 16, 16});
   std::vector<std::vector<HitRecord>> hits(cameras.size(),
                                            std::vector<HitRecord>(size.num_rays(), no_hit()));
@@ -214,7 +214,7 @@ TEST_P(BricksOnDevice, LevelsOfDetail) {
   };
   for (std::size_t brick = 0; brick < cuts.bricks().size(); ++brick) {
     const CompressedVolume volume = cut_brick(whole, cuts.bricks()[brick], kLevels);
-    Renderer renderer(device_, volume, options);
+    DeviceRenderer renderer(device_, volume, options);
     for (std::size_t view = 0; view < cameras.size(); ++view) {
       renderer.render(request(view));
       const View rays = make_view(info, cameras[view], size);
@@ -256,12 +256,12 @@ class AmbientBricksOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     options.with_levels = voxel_pixels > 0;
     const Twin twin(whole, voxel_pixels);
     std::vector<CompressedVolume> bricks;
-    std::vector<std::unique_ptr<Renderer>> renderers;
+    std::vector<std::unique_ptr<DeviceRenderer>> renderers;
     const std::vector<VolumeInfo> infos = level_infos(whole, options.with_levels);
     const std::size_t num_levels = infos.size();
     for (const BlockBox &own : cuts.bricks()) {
       bricks.push_back(cut_brick(whole, own, num_levels));
-      renderers.push_back(std::make_unique<Renderer>(device_, bricks.back(), options));
+      renderers.push_back(std::make_unique<DeviceRenderer>(device_, bricks.back(), options));
     }
     const std::size_t num_pixels = options.size.num_rays();
     std::uint64_t num_met_elsewhere = 0;
@@ -311,7 +311,7 @@ class AmbientBricksOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
       const std::vector<HitRecord> hits = twin.render(cameras[view], options.size, kIsovalue);
       const OpenCounts expected = twin.open(cameras[view], options.size, kIsovalue, hits, num_rays);
       EXPECT_EQ(open.counts, expected.counts);
-      Renderer &renderer = *renderers.front();
+      DeviceRenderer &renderer = *renderers.front();
       renderer.set_open(open);
       const FrameParams frame =
           make_frame_params(whole.info, cameras[view], options.size, kIsovalue);
@@ -352,11 +352,11 @@ TEST_P(AmbientBricksOnDevice, RaysThatGoOnAreRefused) {
   const Cuts cuts(blocks_along(volume.info()), 2);
   const CompressedVolume brick = cut_brick(volume.compressed, cuts.bricks()[0]);
   const RendererOptions options{.size = {6, 5}, .with_given_rays = true};
-  Renderer renderer(device_, brick, options);
+  DeviceRenderer renderer(device_, brick, options);
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
   EXPECT_THROW(renderer.render({.camera = camera, .ambient_rays = 1}), Error);
   EXPECT_THROW(renderer.cast_rays({}, 0.1f, Normals::kCell), Error);
-  Renderer whole(device_, volume.compressed, options);
+  DeviceRenderer whole(device_, volume.compressed, options);
   whole.render({.camera = camera});
   EXPECT_THROW(whole.begin_ambient({.camera = camera}, whole.hits(), {}), Error);
 }

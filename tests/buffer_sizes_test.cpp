@@ -13,18 +13,18 @@
 #include <string>
 #include <tuple>
 
-#include "core/render/blocks_wave.hpp"
+#include "core/paper/block_triangles.hpp"
+#include "core/paper/blocks_pipeline.hpp"
+#include "core/paper/rasterise.hpp"
+#include "core/paper/resident.hpp"
+#include "core/paper/traverse.hpp"
 #include "core/render/pass_readback.hpp"
 #include "core/render/ray_waves.hpp"
 #include "core/stages/active_blocks.hpp"
 #include "core/stages/ambient.hpp"
-#include "core/stages/block_triangles.hpp"
 #include "core/stages/kept_picture.hpp"
 #include "core/stages/marching_cubes.hpp"
-#include "core/stages/rasterise.hpp"
-#include "core/stages/resident.hpp"
 #include "core/stages/shade.hpp"
-#include "core/stages/traverse.hpp"
 #include "core/stages/zfp_encode.hpp"
 #include "tests/stage_world.hpp"
 #include "tests/test_devices.hpp"
@@ -270,22 +270,23 @@ void check_pipelines(ocl::Device &device) {
   levels.push_back({volume.info, volume.precision, LevelError(volume, true), std::move(stream),
                     std::move(macrocells), std::move(decode)});
   for (const Grouping grouping : {Grouping::kRadix, Grouping::kCounting}) {
-    const Group::Limits limits{100, 20, 8, grouping};
+    const WaveLimits limits{100, 20, 8};
+    const PipelinePtr pipeline = blocks_pipeline({.grouping = grouping});
     BlockStore blocks(device, std::move(levels),
                       BlockCache(device, BlockCache::limits_for(grid.grid, 20, 100), 8));
     Wavefront rays(device, {limits.num_rays});
-    const auto make_blocks_wave = [&] {
-      return std::make_unique<BlocksWave>(blocks, rays, limits, kDefaultSolver, kDefaultClosestHit);
-    };
-    expect_books(device, pipeline_sizes(PipelineKind::kBlocks, limits), make_blocks_wave);
+    expect_books(device, pipeline->sizes(limits),
+                 [&] { return pipeline->make_wave(blocks, rays, limits, {}); });
     for (const RaySource source : {RaySource::kCamera, RaySource::kGiven}) {
-      expect_books(device, pipeline_sizes(PipelineKind::kRays, limits), [&] {
+      expect_books(device, rays_pipeline()->sizes(limits), [&] {
         return std::make_unique<RaysWave>(blocks, rays, 8, kDefaultSolver, source,
                                           RayPackets::kAuto, DecodeOnDemand::kAuto);
       });
     }
     rays = Wavefront(device, {.num_rays = limits.num_rays, .scanned_pairs = true});
-    expect_books(device, pipeline_sizes(PipelineKind::kBlocks, limits, true), make_blocks_wave);
+    const PipelinePtr scanned = blocks_pipeline({.grouping = grouping, .scanned_pairs = true});
+    expect_books(device, scanned->sizes(limits),
+                 [&] { return scanned->make_wave(blocks, rays, limits, {}); });
     levels = std::move(blocks.levels);
   }
 }

@@ -12,6 +12,7 @@
 
 #include "core/accuracy/choose_detail.hpp"
 #include "core/base/error.hpp"
+#include "core/render/device_renderer.hpp"
 #include "core/volume/pyramid.hpp"
 #include "core/zfp/level_bounds.hpp"
 #include "kernels_cl/portable/block_bound.h"
@@ -220,7 +221,7 @@ class CertifyOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
  protected:
   /// Draws a frame, checks its bounds, and counts the pixels that keep max_surface_error. Returns
   /// the hits.
-  std::vector<HitRecord> certify_frame(Renderer &renderer, const Scene &scene,
+  std::vector<HitRecord> certify_frame(DeviceRenderer &renderer, const Scene &scene,
                                        const FrameRequest &request, double max_surface_error) {
     renderer.render(request);
     std::vector<HitRecord> drawn = renderer.hits();
@@ -242,7 +243,8 @@ TEST_P(CertifyOnDevice, SmallBoundsAreTheTwins) {
   const ImageSize size = is_simulator(device_.info()) ? kTiny : kSmall;
   const Scene scene({9, 10, 11}, test::gyroid_field(9), {.rate = 6});
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
-  Renderer renderer(device_, scene.volume, {.size = size, .cache_slots = 20, .with_bounds = true});
+  DeviceRenderer renderer(device_, scene.volume,
+                          {.size = size, .cache_slots = 20, .with_bounds = true});
   for (const FieldBound bound : {FieldBound::kLower, FieldBound::kUpper, FieldBound::kNone}) {
     renderer.render({.camera = camera, .isovalue = 0.4f, .bound = bound});
     expect_same_hits(renderer.hits(), Twin(scene.volume, 0, 0, bound).render(camera, size, 0.4f),
@@ -258,7 +260,7 @@ TEST_P(CertifyOnDevice, BoundsOfLevelsAndPlanesAreTheTwins) {
     const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
     for (const StreamPlace place : {StreamPlace::kDevice, StreamPlace::kHost}) {
       ocl::Device device(GetParam());
-      Renderer renderer(
+      DeviceRenderer renderer(
           device, scene.volume,
           {.size = kMedium, .stream = place, .with_levels = true, .with_bounds = true});
       EXPECT_EQ(device.ledger().current(), renderer.memory_plan().total());
@@ -288,8 +290,8 @@ TEST_P(CertifyOnDevice, NoCertifiedPixelIsFartherOff) {
            {CompressOptions{.rate = 8},
             CompressOptions{.precision = BlockPrecision{.min_exponent = -8}}}) {
         const Scene scene(dims, field, options);
-        Renderer renderer(device_, scene.volume,
-                          {.size = kMedium, .with_levels = true, .with_bounds = true});
+        DeviceRenderer renderer(device_, scene.volume,
+                                {.size = kMedium, .with_levels = true, .with_bounds = true});
         std::vector<Camera> cameras = orbit_cameras(scene.volume.info, 2);
         cameras.push_back(camera_along({20, 18, 16}, {0.3, 0.2, 1}));  // from within
         for (const Camera &camera : cameras) {
@@ -310,8 +312,8 @@ TEST_P(CertifyOnDevice, NoCertifiedPixelIsFartherOff) {
 TEST_P(CertifyOnDevice, RealVolumes) {
   for (const char *file : {"fuel_64x33x32_uint8.raw.gz", "head_41x41x41_uint8.raw.gz"}) {
     const Scene scene(file, {.rate = 8});
-    Renderer renderer(device_, scene.volume,
-                      {.size = kMedium, .with_levels = true, .with_bounds = true});
+    DeviceRenderer renderer(device_, scene.volume,
+                            {.size = kMedium, .with_levels = true, .with_bounds = true});
     for (const float isovalue : {20.0f, 80.0f, 160.0f}) {
       for (const Camera &camera : orbit_cameras(scene.volume.info, 3)) {
         for (const double voxel_pixels : {0.0, 2.0}) {
@@ -331,7 +333,7 @@ TEST_P(CertifyOnDevice, FarAway) {
   Camera camera = orbit_cameras(scene.volume.info, 1)[0];
   camera.eye = camera.at + 700.0 * (camera.eye - camera.at);
   camera.fovy_deg /= 700;
-  Renderer renderer(device_, scene.volume, {.size = kMedium, .with_bounds = true});
+  DeviceRenderer renderer(device_, scene.volume, {.size = kMedium, .with_bounds = true});
   renderer.render({camera, 80});
   const std::vector<HitRecord> drawn = renderer.hits();
   const std::vector<double> slack = expect_kept(
@@ -349,7 +351,7 @@ TEST_P(CertifyOnDevice, ExactVolumes) {
   const Scene scene({40, 40, 40}, noise,
                     {.precision = BlockPrecision{
                          .min_exponent = -6, .whole_numbers = true, .max_voxel_error = 0}});
-  Renderer renderer(device_, scene.volume, {.size = kMedium, .with_bounds = true});
+  DeviceRenderer renderer(device_, scene.volume, {.size = kMedium, .with_bounds = true});
   for (const double x : {12.0, 19.0, 26.0}) {
     for (const glm::dvec3 &direction : {glm::dvec3{0.2, 0.3, 1}, glm::dvec3{1, -0.2, 0.1}}) {
       const Camera camera = camera_along({x, 20, 21}, direction);
@@ -367,8 +369,8 @@ TEST_P(CertifyOnDevice, BoundsAreTight) {
        {CompressOptions{.rate = 4}, CompressOptions{.precision = BlockPrecision{.min_exponent = -6,
                                                                  .max_voxel_error = 0.015625}}}) {
     const Scene scene({96, 96, 96}, test::gyroid_field(48), options);
-    Renderer renderer(device_, scene.volume,
-                      {.size = kMedium, .with_levels = true, .with_bounds = true});
+    DeviceRenderer renderer(device_, scene.volume,
+                            {.size = kMedium, .with_levels = true, .with_bounds = true});
     const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
     for (const double voxel_pixels : {0.0, 2.0}) {
       const FrameRequest request{.camera = camera, .isovalue = 0.3f, .voxel_pixels = voxel_pixels};
@@ -391,7 +393,7 @@ TEST_P(CertifyOnDevice, BoundsAreTight) {
 TEST_P(CertifyOnDevice, BoundsThatPromiseTooMuchAreFound) {
   const Scene scene({33, 48, 40}, test::gyroid_field(24), {.rate = 4});
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
-  Renderer renderer(device_, scene.volume, {.size = kMedium, .with_bounds = true});
+  DeviceRenderer renderer(device_, scene.volume, {.size = kMedium, .with_bounds = true});
   renderer.render({camera, 0.3f});
   const std::vector<HitRecord> drawn = renderer.hits();
   const std::vector<float> bounds = certify(renderer, scene.volume, {camera, 0.3f}, drawn).bounds;
@@ -414,8 +416,8 @@ TEST_P(CertifyOnDevice, ChoosesLessForMore) {
   const glm::uvec3 dims(96, 96, 96);
   const Scene scene(dims, test::sphere_field(dims),
                     {.precision = BlockPrecision{.min_exponent = -10}});
-  Renderer renderer(device_, scene.volume,
-                    {.size = kMedium, .with_levels = true, .with_bounds = true});
+  DeviceRenderer renderer(device_, scene.volume,
+                          {.size = kMedium, .with_levels = true, .with_bounds = true});
   Camera camera = orbit_cameras(scene.volume.info, 1)[0];
   camera.eye += 0.35 * (camera.eye - camera.at);  // so far that levels spare most blocks
   double voxel_pixels = -1, voxel_error = -1;
@@ -451,8 +453,8 @@ TEST_P(CertifyOnDevice, ChoosesLessForMore) {
 TEST_P(CertifyOnDevice, LeavesOutPlanesOfManyBitsOnly) {
   for (const std::uint32_t rate : {8u, 16u, 24u}) {
     const Scene scene({48, 48, 48}, test::gyroid_field(24), {.rate = rate});
-    Renderer renderer(device_, scene.volume,
-                      {.size = kMedium, .with_levels = true, .with_bounds = true});
+    DeviceRenderer renderer(device_, scene.volume,
+                            {.size = kMedium, .with_levels = true, .with_bounds = true});
     const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
     const DetailChoice choice = choose_detail(renderer, scene.volume, {camera, 0.3f}, 1);
     EXPECT_TRUE(choice.reachable);
@@ -465,8 +467,8 @@ TEST_P(CertifyOnDevice, LeavesOutPlanesOfManyBitsOnly) {
 TEST_P(CertifyOnDevice, TakesNoLevelsThatSpareLittle) {
   const Scene scene({96, 96, 96}, test::gyroid_field(48),
                     {.precision = BlockPrecision{.min_exponent = -10}});
-  Renderer renderer(device_, scene.volume,
-                    {.size = kMedium, .with_levels = true, .with_bounds = true});
+  DeviceRenderer renderer(device_, scene.volume,
+                          {.size = kMedium, .with_levels = true, .with_bounds = true});
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
   const DetailChoice choice = choose_detail(renderer, scene.volume, {camera, 0.3f}, 0.05);
   EXPECT_TRUE(std::ranges::any_of(choice.tries, [&](const DetailChoice::Try &each) {
@@ -484,8 +486,8 @@ TEST_P(CertifyOnDevice, RaysThatEnterBehindABorderAreCertain) {
   const Scene scene(dims, test::sphere_field(dims),
                     {.precision = BlockPrecision{.min_exponent = -10}});
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
-  Renderer renderer(device_, scene.volume,
-                    {.size = kMedium, .with_levels = true, .with_bounds = true});
+  DeviceRenderer renderer(device_, scene.volume,
+                          {.size = kMedium, .with_levels = true, .with_bounds = true});
   for (const double voxel_pixels :
        {1.0, 1.4}) {  // a border among the places where rays enter, or in the surface
     FrameRequest request{.camera = camera, .isovalue = 0.5f, .voxel_pixels = voxel_pixels};
@@ -515,7 +517,7 @@ TEST_P(CertifyOnDevice, RaysThatEnterBehindABorderAreCertain) {
 TEST_P(CertifyOnDevice, PicturesBelowTheLargestAreTheTwins) {
   const Scene scene({20, 20, 20}, test::gyroid_field(10), {.rate = 8});
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
-  Renderer renderer(device_, scene.volume, {.size = kMedium});
+  DeviceRenderer renderer(device_, scene.volume, {.size = kMedium});
   for (const ImageSize size : {kSmall, kMedium, ImageSize{7, 5}}) {
     renderer.render({camera, 0.3f, size});
     const auto expected = Twin(scene.volume).render(camera, size, 0.3f);
@@ -531,8 +533,8 @@ TEST_P(CertifyOnDevice, PixelsOfSeveralRaysAreAsWide) {
   const Scene scene({30, 30, 30}, test::gyroid_field(10), {.rate = 8});
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
   const auto bounds = [&](ImageSize size, double voxel_pixels) {
-    Renderer renderer(device_, scene.volume,
-                      {.size = size, .with_levels = true, .with_bounds = true});
+    DeviceRenderer renderer(device_, scene.volume,
+                            {.size = size, .with_levels = true, .with_bounds = true});
     const FrameRequest request{.camera = camera, .isovalue = 0.3f, .voxel_pixels = voxel_pixels};
     renderer.render(request);
     return certify(renderer, scene.volume, request, renderer.hits()).bounds;
@@ -551,7 +553,7 @@ TEST_P(CertifyOnDevice, RefusesWhatIsNotKnown) {
   const Scene scene({20, 20, 20}, test::gyroid_field(10), {.rate = 8});
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
   const auto certify_with = [&](const CompressedVolume &volume, const RendererOptions &options) {
-    Renderer renderer(device_, volume, options);
+    DeviceRenderer renderer(device_, volume, options);
     const FrameRequest request{
         .camera = camera, .isovalue = 0.3f, .voxel_pixels = options.with_levels ? 1.0 : 0.0};
     renderer.render(request);
@@ -580,7 +582,7 @@ TEST_P(CertifyOnDevice, RefusesWhatIsNotKnown) {
                      {.size = kSmall, .solver = solver_from_string("linear"), .with_bounds = true});
       },
       ThrowsMessage<Error>(HasSubstr("bernstein")));
-  Renderer renderer(device_, scene.volume, {.size = kSmall, .with_bounds = true});
+  DeviceRenderer renderer(device_, scene.volume, {.size = kSmall, .with_bounds = true});
   renderer.render({camera, 0.3f});
   const std::vector<HitRecord> hits = renderer.hits();
   for (const FrameRequest &bad :
@@ -600,7 +602,7 @@ TEST_P(CertifyOnDevice, RefusesWhatIsNotKnown) {
 TEST_P(CertifyOnDevice, HitsOfAnotherPictureAreRefused) {
   const Scene scene({20, 20, 20}, test::gyroid_field(10), {.rate = 8});
   const FrameRequest request{orbit_cameras(scene.volume.info, 1)[0], 0.3f, kSmall};
-  Renderer renderer(device_, scene.volume, {.size = kSmall, .with_bounds = true}),
+  DeviceRenderer renderer(device_, scene.volume, {.size = kSmall, .with_bounds = true}),
       plain(device_, scene.volume, {.size = kSmall});
   renderer.render(request);
   const std::vector<HitRecord> hits = renderer.hits();
@@ -608,14 +610,14 @@ TEST_P(CertifyOnDevice, HitsOfAnotherPictureAreRefused) {
               ThrowsMessage<Error>(HasSubstr("9 hits are not those of 96 rays")));
   expect_same_hits(renderer.hits(), hits, kSmall.width);
   EXPECT_THAT([&] { certify(plain, scene.volume, request, hits); },
-              ThrowsMessage<Error>(HasSubstr("without bounds")));
+              ThrowsMessage<Error>(HasSubstr("draws no bounds")));
 }
 
 /// Whatever kind of frame comes between, and wherever it ends: the next is right.
 TEST_P(CertifyOnDevice, RequestsOfAllKindsInAnyOrder) {
   const Scene scene({30, 27, 33}, test::gyroid_field(10), {.rate = 8});
   const std::vector<Camera> cameras = orbit_cameras(scene.volume.info, 2);
-  Renderer renderer(
+  DeviceRenderer renderer(
       device_, scene.volume,
       {.size = kMedium, .cache_slots = 100, .with_levels = true, .with_bounds = true});
   const FieldBound bounds[] = {FieldBound::kNone, FieldBound::kUpper, FieldBound::kLower};

@@ -12,7 +12,8 @@
 #include <nlohmann/json.hpp>
 
 #include "core/ocl/kernel_cache.hpp"
-#include "core/render/renderer.hpp"
+#include "core/paper/blocks_pipeline.hpp"
+#include "core/render/device_renderer.hpp"
 #include "core/stages/march_packets.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/run_program.hpp"
@@ -55,7 +56,7 @@ class CompileOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
 
   /// Draws in every way that the options allow. Nothing may be left to compile.
   void expect_all_compiled(const RendererOptions &options) {
-    Renderer renderer(device_, volume_, options);
+    DeviceRenderer renderer(device_, volume_, options);
     EXPECT_GT(device_.compile_ms(), 0);
     const std::vector<std::string> programs = device_.built_programs();
     std::vector<std::string> late;
@@ -87,7 +88,7 @@ class CompileOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
 };
 
 TEST_P(CompileOnDevice, NothingIsLeftForFrames) {
-  for (const PipelineKind pipeline : {PipelineKind::kRays, PipelineKind::kBlocks}) {
+  for (const PipelinePtr &pipeline : {rays_pipeline(), blocks_pipeline()}) {
     for (const StreamPlace stream : {StreamPlace::kDevice, StreamPlace::kHost}) {
       expect_all_compiled({.size = kSize, .pipeline = pipeline, .stream = stream});
       expect_all_compiled(
@@ -98,18 +99,17 @@ TEST_P(CompileOnDevice, NothingIsLeftForFrames) {
   expect_all_compiled({.size = kSize, .stream = StreamPlace::kHost, .with_levels = true});
   expect_all_compiled({.size = kSize, .with_kept_picture = true});
   expect_all_compiled({.size = kSize, .with_levels = true, .with_given_rays = true});
-  expect_all_compiled({.size = kSize, .pipeline = PipelineKind::kBlocks, .with_given_rays = true});
+  expect_all_compiled({.size = kSize, .pipeline = blocks_pipeline(), .with_given_rays = true});
 }
 
 TEST_P(CompileOnDevice, EverySolverAndGroupingIsCompiled) {
   for (const std::string_view solver : kSolverNames)
     expect_all_compiled({.size = kSize, .solver = solver_from_string(solver)});
-  expect_all_compiled({.size = kSize,
-                       .pipeline = PipelineKind::kBlocks,
-                       .group_size = 32,
-                       .grouping = Grouping::kRadix,
-                       .closest = ClosestHit::kScan});
-  expect_all_compiled({.size = kSize, .pipeline = PipelineKind::kBlocks, .scanned_pairs = true});
+  expect_all_compiled(
+      {.size = kSize,
+       .pipeline = blocks_pipeline({.grouping = Grouping::kRadix, .closest = ClosestHit::kScan}),
+       .group_size = 32});
+  expect_all_compiled({.size = kSize, .pipeline = blocks_pipeline({.scanned_pairs = true})});
 }
 
 TEST_P(CompileOnDevice, WhatIsNotLaunchedIsNotBuilt) {
@@ -118,7 +118,7 @@ TEST_P(CompileOnDevice, WhatIsNotLaunchedIsNotBuilt) {
     ocl::Device device(GetParam());
     options.packets = packets;
     options.with_shading = shading;
-    Renderer renderer(device, volume_, options);
+    DeviceRenderer renderer(device, volume_, options);
     renderer.render({.camera = cameras_[0],
                      .isovalue = 0.1f,
                      .voxel_pixels = options.with_levels ? 2.0 : 0.0,
@@ -147,24 +147,25 @@ TEST_P(CompileOnDevice, WhatIsNotLaunchedIsNotBuilt) {
   }
   // Where one work-group scans alone, a GPU gives it more work-items.
   const char *scan = GetParam().type == ocl::DeviceType::kGpu ? "scan x2" : "scan";
-  EXPECT_THAT(stems({.size = kSize, .pipeline = PipelineKind::kBlocks}),
+  EXPECT_THAT(stems({.size = kSize, .pipeline = blocks_pipeline()}),
               ElementsAre("block_cache", "composite", "group", "initial_rays", "intersect",
                           "macrocells", scan, "speculation", "traverse", "zfp_decode"));
   EXPECT_THAT(
-      stems({.size = kSize, .pipeline = PipelineKind::kBlocks, .grouping = Grouping::kRadix}),
+      stems({.size = kSize, .pipeline = blocks_pipeline({.grouping = Grouping::kRadix})}),
       ElementsAre("block_cache", "composite", "group", "initial_rays", "intersect", "macrocells",
                   "radix_sort", scan, "speculation", "traverse", "zfp_decode"));
 }
 
 /// What compiling leaves behind must not show.
 TEST_P(CompileOnDevice, FirstFrameIsThatOfANewRenderer) {
-  for (const PipelineKind pipeline : {PipelineKind::kRays, PipelineKind::kBlocks}) {
+  for (const PipelinePtr &pipeline : {rays_pipeline(), blocks_pipeline()}) {
     ocl::Device device(GetParam(), true);
-    Renderer renderer(device, volume_, {.size = kSize, .pipeline = pipeline});
+    DeviceRenderer renderer(device, volume_, {.size = kSize, .pipeline = pipeline});
     EXPECT_THAT(device.timer().collect(), IsEmpty());
     EXPECT_EQ(device.ledger().current(), renderer.memory_plan().total());
     const FrameStats first = renderer.render({cameras_[0], 0.1f});
-    EXPECT_EQ(first.passes.front().counts.pass, 1u + (pipeline == PipelineKind::kBlocks ? 1u : 0u));
+    EXPECT_EQ(first.passes.front().counts.pass,
+              1u + (blocks_options(*pipeline) != nullptr ? 1u : 0u));
     renderer.clear_cache();
     const FrameStats again = renderer.render({cameras_[0], 0.1f});
     ASSERT_EQ(first.passes.size(), again.passes.size());

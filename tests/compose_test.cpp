@@ -28,7 +28,7 @@ TEST(Compose, TheSmallestWordsAndHalves) {
             (std::vector<std::uint64_t>{0x0000000700000009, 0xFFFFFFFFFFFFFFFF, 15}));
 }
 
-/// A brick's picture as Renderer::shade_packed() has it.
+/// A brick's picture as DeviceRenderer::shade_packed() has it.
 std::vector<std::uint32_t> random_colors(std::size_t num_rays, std::mt19937 &rng) {
   constexpr std::uint32_t kBackground = 0x123456;
   std::vector<std::uint32_t> colors(num_rays);

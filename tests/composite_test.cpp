@@ -1,6 +1,6 @@
 // core/composite: results made up at random, against a plain loop over each ray's pairs.
 
-#include "core/stages/composite.hpp"
+#include "core/paper/composite.hpp"
 
 #include <gtest/gtest.h>
 

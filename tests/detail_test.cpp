@@ -3,6 +3,7 @@
 
 #include "core/view/detail.hpp"
 #include "core/io/open_volume.hpp"
+#include "core/paper/blocks_pipeline.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,7 +13,7 @@
 #include <random>
 
 #include "core/base/error.hpp"
-#include "core/render/renderer.hpp"
+#include "core/render/device_renderer.hpp"
 #include "core/volume/pyramid.hpp"
 #include "reference/twin.hpp"
 #include "tests/frame_scene.hpp"
@@ -209,7 +210,7 @@ class LevelsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     options.with_levels = true;
     const Twin twin(volume, voxel_pixels);
     const std::vector<VolumeInfo> infos = level_infos(volume, true);
-    Renderer renderer(device_, volume, options);
+    DeviceRenderer renderer(device_, volume, options);
     std::size_t at_border = 0;
     for (const Camera &camera : cameras) {
       const auto expected = twin.render(camera, options.size, isovalue);
@@ -318,7 +319,8 @@ TEST_P(LevelsOnDevice, CancelledFramesLeaveNoTrace) {
   std::map<double, Twin> twins;
   for (const double voxel_pixels : {0.0, 3.0, 30.0})
     twins.try_emplace(voxel_pixels, volume, voxel_pixels);
-  Renderer renderer(device_, volume, {.size = kMedium, .cache_slots = 100, .with_levels = true});
+  DeviceRenderer renderer(device_, volume,
+                          {.size = kMedium, .cache_slots = 100, .with_levels = true});
   for (std::size_t last_pass = 1; last_pass < 12; ++last_pass) {
     std::size_t pass = 0;
     renderer.render({.camera = cameras[last_pass % 3],
@@ -338,7 +340,7 @@ TEST_P(LevelsOnDevice, CancelledFramesLeaveNoTrace) {
 TEST_P(LevelsOnDevice, FewerPlanesOfEveryLevel) {
   const CompressedVolume volume = pyramid_of({30, 27, 33}, test::gyroid_field(10));
   const Camera camera = orbit_cameras(volume.info, 1)[0];
-  Renderer renderer(device_, volume, {.size = kMedium, .with_levels = true});
+  DeviceRenderer renderer(device_, volume, {.size = kMedium, .with_levels = true});
   for (const double voxel_error : {0.0, 0.3, 0.01}) {
     renderer.render(
         {.camera = camera, .isovalue = 0.4f, .voxel_pixels = 3, .voxel_error = voxel_error});
@@ -351,7 +353,7 @@ TEST_P(LevelsOnDevice, FewerPlanesOfEveryLevel) {
 TEST_P(LevelsOnDevice, FewerPlanesWithDistance) {
   const CompressedVolume volume = pyramid_of({30, 27, 33}, test::gyroid_field(10));
   const Camera camera = orbit_cameras(volume.info, 1)[0];
-  Renderer renderer(device_, volume, {.size = kMedium, .with_levels = true});
+  DeviceRenderer renderer(device_, volume, {.size = kMedium, .with_levels = true});
   const FrameStats stats = renderer.render(
       {.camera = camera, .isovalue = 0.4f, .voxel_pixels = 30, .voxel_error = 0.02});
   const std::size_t level = stats.first_level;
@@ -370,7 +372,8 @@ TEST_P(LevelsOnDevice, FewerPlanesWithDistance) {
 /// A band's end is not the rays'.
 TEST_P(LevelsOnDevice, FramesAreCompleteAfterTheLastBand) {
   const CompressedVolume volume = pyramid_of({30, 27, 33}, test::gyroid_field(10));
-  Renderer renderer(device_, volume, {.size = kMedium, .cache_slots = 100, .with_levels = true});
+  DeviceRenderer renderer(device_, volume,
+                          {.size = kMedium, .cache_slots = 100, .with_levels = true});
   const FrameStats stats = renderer.render(
       {.camera = orbit_cameras(volume.info, 1)[0], .isovalue = 0.4f, .voxel_pixels = 3});
   ASSERT_LT(stats.first_level, stats.last_level);
@@ -385,7 +388,7 @@ TEST_P(LevelsOnDevice, DecodesFewerBlocks) {
   const CompressedVolume volume = pyramid_of({64, 64, 64}, test::gyroid_field(16));
   const Camera camera = camera_along({32, 32, -200}, {0, 0, 1}, {0, 1, 0}, 30);
   const auto num_decoded = [&](double voxel_pixels) {
-    Renderer renderer(device_, volume, {.size = kMedium, .with_levels = true});
+    DeviceRenderer renderer(device_, volume, {.size = kMedium, .with_levels = true});
     const FrameStats stats =
         renderer.render({.camera = camera, .isovalue = 0.4f, .voxel_pixels = voxel_pixels});
     return std::accumulate(
@@ -407,8 +410,8 @@ TEST_P(LevelsOnDevice, FourRaysAPixelOfACoarseLevelBeatOneOfTheFinest) {
   };
   const auto draw = [&](ImageSize size, double voxel_pixels) {
     // Several levels are never decoded on demand, which would decode fewer blocks of one.
-    Renderer renderer(device_, volume,
-                      {.size = size, .on_demand = DecodeOnDemand::kOff, .with_levels = true});
+    DeviceRenderer renderer(device_, volume,
+                            {.size = size, .on_demand = DecodeOnDemand::kOff, .with_levels = true});
     Picture picture;
     const FrameStats stats =
         renderer.render({.camera = camera, .isovalue = 30, .voxel_pixels = voxel_pixels});
@@ -431,15 +434,15 @@ TEST_P(LevelsOnDevice, RefusesWhatItCannotDraw) {
   const CompressedVolume volume = pyramid_of({20, 20, 20}, test::gyroid_field(10));
   CompressedVolume flat = volume;
   flat.coarser_levels.clear();
-  EXPECT_THAT([&] { Renderer(device_, flat, {.size = kSmall, .with_levels = true}); },
+  EXPECT_THAT([&] { DeviceRenderer(device_, flat, {.size = kSmall, .with_levels = true}); },
               ThrowsMessage<Error>(AllOf(HasSubstr("no levels of detail"), HasSubstr("--levels"))));
   EXPECT_THAT(
       [&] {
-        Renderer(device_, volume,
-                 {.size = kSmall, .pipeline = PipelineKind::kBlocks, .with_levels = true});
+        DeviceRenderer(device_, volume,
+                 {.size = kSmall, .pipeline = blocks_pipeline(), .with_levels = true});
       },
       ThrowsMessage<Error>(HasSubstr("pipeline blocks")));
-  Renderer renderer(device_, volume, {.size = kSmall, .with_levels = true});
+  DeviceRenderer renderer(device_, volume, {.size = kSmall, .with_levels = true});
   FrameRequest request{.camera = orbit_cameras(volume.info, 1)[0], .isovalue = 0.4f};
   for (const double bad : {-1.0, double{NAN}, double{INFINITY}}) {
     request.voxel_pixels = bad;

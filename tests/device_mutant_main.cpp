@@ -6,6 +6,7 @@
 
 #include <string_view>
 
+#include "core/paper/blocks_pipeline.hpp"
 #include "reference/watertight_device.hpp"
 
 int main(int argc, char **argv) {
@@ -14,7 +15,7 @@ int main(int argc, char **argv) {
   bool all_leak = argc > 1;
   for (int i = 1; i < argc; ++i) {
     const std::string_view name = argv[i];
-    const PipelineKind pipeline = name == "blocks" ? PipelineKind::kBlocks : PipelineKind::kRays;
+    const PipelinePtr pipeline = name == "blocks" ? blocks_pipeline() : rays_pipeline();
     const RayPackets packets = name == "packets" ? RayPackets::kOn : RayPackets::kOff;
     std::uint64_t leaks = 0;
     for (const WatertightResult &result : run_watertight_on(

@@ -16,7 +16,7 @@
 #include "core/base/error.hpp"
 #include "core/extract/extractor.hpp"
 #include "core/host/host_renderer.hpp"
-#include "core/render/renderer.hpp"
+#include "core/render/device_renderer.hpp"
 #include "core/zfp/stated_errors.hpp"
 #include "core/zfp/zfp_accuracy.hpp"
 #include "core/zfp/zfp_file.hpp"
@@ -157,7 +157,7 @@ class HostileValues : public testing::TestWithParam<PipelineOnDevice> {
   void draw(const CompressedVolume &volume) {
     constexpr ImageSize kSize{24, 16};
     ocl::Device device(GetParam().device);
-    Renderer renderer(device, volume, GetParam().with({.size = kSize}));
+    DeviceRenderer renderer(device, volume, GetParam().with({.size = kSize}));
     HostRenderer host(volume);
     const Camera camera = orbit_cameras(volume.info, 3)[2];
     for (const float isovalue : {0.2f, -1e38f}) {

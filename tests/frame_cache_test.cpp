@@ -7,7 +7,8 @@
 #include <numeric>
 #include <set>
 
-#include "core/render/renderer.hpp"
+#include "core/paper/blocks_pipeline.hpp"
+#include "core/render/device_renderer.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/stage_support.hpp"
 #include "tests/test_pipelines.hpp"
@@ -57,9 +58,9 @@ class FrameCacheOnDevice : public testing::TestWithParam<PipelineOnDevice> {
   /// pipeline `blocks` asks for, and those of its normals.
   std::vector<std::uint32_t> blocks_read(const TestVolume &volume, ImageSize size,
                                          const std::vector<Camera> &cameras) {
-    Renderer ample(device_, volume.compressed,
+    DeviceRenderer ample(device_, volume.compressed,
                    {.size = size,
-                    .pipeline = PipelineKind::kBlocks,
+                    .pipeline = blocks_pipeline(),
                     .cache_slots = static_cast<std::uint32_t>(volume.compressed.block_count()),
                     .max_speculation = 1});
     std::vector<std::uint32_t> counts;
@@ -70,8 +71,8 @@ class FrameCacheOnDevice : public testing::TestWithParam<PipelineOnDevice> {
     return counts;
   }
 
-  Renderer renderer_of(const TestVolume &volume, ImageSize size, std::uint32_t slots,
-                       std::uint32_t max_speculation = ISO_MAX_SPECULATION) {
+  DeviceRenderer renderer_of(const TestVolume &volume, ImageSize size, std::uint32_t slots,
+                             std::uint32_t max_speculation = ISO_MAX_SPECULATION) {
     return {
         device_, volume.compressed,
         GetParam().with({.size = size, .cache_slots = slots, .max_speculation = max_speculation})};
@@ -92,7 +93,7 @@ TEST_P(FrameCacheOnDevice, ViewsThatFitAreDecodedOnce) {
   const std::uint32_t most = *std::ranges::max_element(needs);
   ASSERT_GT(most, 40u);
   for (const std::uint32_t slots : {most + most / 4, most + most / 2}) {
-    Renderer renderer = renderer_of(volume, size, slots, 1);
+    DeviceRenderer renderer = renderer_of(volume, size, slots, 1);
     Random random(slots);
     std::vector<std::size_t> drawn;
     std::size_t num_fitting = 0, num_decoding = 0;
@@ -130,7 +131,7 @@ TEST_P(FrameCacheOnDevice, ViewsThatComeAgainAtOnceAreDecodedOnce) {
   const TestVolume volume(dims, test::gyroid_field(14));
   const std::vector<Camera> cameras = close_ups(dims);
   const std::vector<std::uint32_t> needs = blocks_read(volume, size, cameras);
-  Renderer renderer = renderer_of(volume, size, 2 * *std::ranges::max_element(needs));
+  DeviceRenderer renderer = renderer_of(volume, size, 2 * *std::ranges::max_element(needs));
   Random random(3);
   int num_decoding = 0;
   for (int frame = 0; frame < 60; ++frame) {
@@ -157,14 +158,14 @@ TEST_P(FrameCacheOnDevice, ViewsThatDoNotFitAreNoWorseOffThanCold) {
   const auto expected = test::twin_hits(volume, camera, size, kIsovalue);
   std::uint32_t needed = 0;
   {
-    Renderer ample =
+    DeviceRenderer ample =
         renderer_of(volume, size, static_cast<std::uint32_t>(volume.compressed.block_count()));
     needed = num_decoded(ample.render({camera, kIsovalue}));
   }
   int num_kept = 0, num_emptied = 0;
   for (const double share : {0.97, 0.8, 0.6, 0.4}) {
     const auto slots = static_cast<std::uint32_t>(share * needed);
-    Renderer renderer = renderer_of(volume, size, slots);
+    DeviceRenderer renderer = renderer_of(volume, size, slots);
     FrameStats last = renderer.render({camera, kIsovalue});
     const std::uint32_t cold = num_decoded(last);
     for (int frame = 0; frame < 4; ++frame) {

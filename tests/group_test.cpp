@@ -1,7 +1,7 @@
 // core/group: pairs gathered by block, exactly those whose dual grid is cached, against plain
 // loops, by either grouping.
 
-#include "core/stages/group.hpp"
+#include "core/paper/group.hpp"
 
 #include <gtest/gtest.h>
 

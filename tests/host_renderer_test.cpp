@@ -18,7 +18,7 @@
 #include "core/host/host_renderer.hpp"
 #include "core/io/open_volume.hpp"
 #include "core/platform/memory.hpp"
-#include "core/render/renderer.hpp"
+#include "core/render/device_renderer.hpp"
 #include "core/stages/ambient.hpp"
 #include "reference/random.hpp"
 #include "tests/frame_scene.hpp"
@@ -531,7 +531,8 @@ TEST(HostRenderer, RequestsThatFailAreOneLine) {
   expect_error("leave out voxel_pixels", [](FrameRequest &r) { r.voxel_pixels = 1; });
   expect_error("leave out voxel_error", [](FrameRequest &r) { r.voxel_error = 0.5; });
   expect_error("leave out bound", [](FrameRequest &r) { r.bound = FieldBound::kUpper; });
-  EXPECT_THAT(error_of([&] { renderer.camera(NAN, kOdd); }), HasSubstr("NaN"));
+  const float nan = NAN;
+  EXPECT_THAT(error_of([&] { renderer.camera({&nan, 1}, kOdd); }), HasSubstr("NaN"));
 }
 
 std::shared_ptr<const Volume> public_volume() {
@@ -552,15 +553,15 @@ isowave::FrameRequest public_request(const Camera &camera) {
 }
 
 TEST(ApiHostRenderer, RefusesInOneLineWhatDevicesAloneCan) {
-  isowave::HostRenderer renderer(public_volume());
+  isowave::Renderer renderer = isowave::make_host_renderer(public_volume());
   const isowave::FrameRequest good{.camera = renderer.camera(10), .isovalue = 10, .size = {64, 48}};
-  EXPECT_TRUE(isowave::HostRenderer::can_draw(good));
+  EXPECT_TRUE(renderer.can_draw(good));
   const std::vector<std::uint8_t> picture = renderer.render(good).picture;
   const auto expect_error = [&](const char *text, const auto &change) {
     isowave::FrameRequest bad = good;
     change(bad);
     EXPECT_THAT(error_of([&] { renderer.render(bad); }), HasSubstr(text));
-    EXPECT_FALSE(isowave::HostRenderer::can_draw(bad)) << text;
+    EXPECT_FALSE(renderer.can_draw(bad)) << text;
     EXPECT_EQ(renderer.render(good).picture, picture) << text;
   };
   using Request = isowave::FrameRequest;
@@ -570,16 +571,18 @@ TEST(ApiHostRenderer, RefusesInOneLineWhatDevicesAloneCan) {
   expect_error("leave out max_surface_error", [](Request &r) { r.max_surface_error = 1; });
   expect_error("leave out want_bounds", [](Request &r) { r.want_bounds = true; });
   expect_error("leave out time_budget_ms", [](Request &r) { r.time_budget_ms = 1; });
-  EXPECT_THAT(error_of([] { isowave::HostRenderer(nullptr); }), HasSubstr("needs a volume"));
-  EXPECT_THAT(error_of([] { isowave::HostRenderer(public_volume(), {.memory_limit = 1000}); }),
-              HasSubstr("raise the limit"));
+  EXPECT_THAT(error_of([] { isowave::make_host_renderer(nullptr); }), HasSubstr("needs a volume"));
+  EXPECT_THAT(
+      error_of([] { isowave::make_host_renderer(public_volume(), {.memory_limit = 1000}); }),
+      HasSubstr("raise the limit"));
 }
 
 TEST(ApiHostRenderer, CastRaysInTheWorld) {
   Grid grid{.dims = {21, 21, 21}, .spacing = {1, 2, 3}, .origin = {5, 6, 7}};
   std::vector<float> voxels;
   for (int i = 0; i < 21 * 21 * 21; ++i) voxels.push_back(static_cast<float>(i / 441));  // z
-  isowave::HostRenderer renderer(compress(voxels, grid, {.tolerance = 1e-4}));
+  isowave::Renderer renderer =
+      isowave::make_host_renderer(compress(voxels, grid, {.tolerance = 1e-4}));
   // The surface is the plane z = 7 + 3 * 10.5.
   const std::vector<isowave::Ray> rays = {{{10, 20, 0}, {0, 0, 1}},
                                           {{10, 20, 0}, {0, 0, 10}},
@@ -606,7 +609,7 @@ TEST(ApiHostRenderer, CastRaysInTheWorld) {
 }
 
 TEST(ApiHostRenderer, FramesCanBeWatchedAndStopped) {
-  isowave::HostRenderer renderer(public_volume(), {.num_threads = 1});
+  isowave::Renderer renderer = isowave::make_host_renderer(public_volume(), {.num_threads = 1});
   isowave::FrameRequest request{.camera = renderer.camera(10), .isovalue = 10, .size = {128, 96}};
   const Frame whole = renderer.render(request);
   EXPECT_EQ(whole.statistics.passes, 1u);
@@ -634,7 +637,7 @@ TEST(ApiHostRenderer, FramesCanBeWatchedAndStopped) {
 }
 
 TEST(ApiHostRenderer, ThreadsShareARenderer) {
-  isowave::HostRenderer renderer(public_volume());
+  isowave::Renderer renderer = isowave::make_host_renderer(public_volume());
   std::vector<isowave::FrameRequest> requests;
   std::vector<std::vector<float>> depths;
   for (const float isovalue : {10.0f, 60.0f}) {
@@ -666,7 +669,7 @@ TEST_P(HostRendererOnDevice, SmallFramesAreTheDevices) {
   const TestVolume volume(dims, test::sphere_field(dims));
   ocl::Device device(GetParam());
   const ImageSize size{12, 8};
-  Renderer renderer(device, volume.compressed, {.size = size});
+  DeviceRenderer renderer(device, volume.compressed, {.size = size});
   HostRenderer host(volume.compressed);
   const FrameRequest request{orbit_cameras(volume.info(), 1)[0], 0.5f, size};
   EXPECT_EQ(renderer.render(request).rays_hit, host.render(request).rays_hit);
@@ -678,7 +681,7 @@ TEST_P(HostRendererOnDevice, WholeFramesAreThoseOfTheFrontDoor) {
   const auto volume = public_volume();
   isowave::Renderer renderer(isowave::open_device(std::to_string(GetParam().index)), volume,
                              {.largest = {64, 48, 2}, .with_levels = true});
-  isowave::HostRenderer host(volume);
+  isowave::Renderer host = isowave::make_host_renderer(volume);
   const isowave::FrameRequest request =
       public_request(orbit_cameras(test::grid_info({64, 33, 32}), 1)[0]);
   const Frame expected = renderer.render(request), got = host.render(request);
@@ -707,11 +710,12 @@ TEST_P(HostRendererOnDevice, CamerasAreTheDevices) {
   ocl::Device device(GetParam());
   const ImageSize size{64, 48};
   for (const TestVolume &volume : fields) {
-    Renderer renderer(device, volume.compressed, {.size = size});
-    const HostRenderer host(volume.compressed);
+    DeviceRenderer renderer(device, volume.compressed, {.size = size});
+    HostRenderer host(volume.compressed);
     for (const float isovalue :
          {-INFINITY, -9.0f, -0.99f, 0.0f, 0.31f, 0.5f, 0.93f, 1.2f, 7.0f, INFINITY}) {
-      const Camera expected = renderer.camera({&isovalue, 1}), got = host.camera(isovalue, size);
+      const Camera expected = renderer.camera({&isovalue, 1}),
+                   got = host.camera({&isovalue, 1}, size);
       EXPECT_EQ(got.eye, expected.eye) << isovalue;
       EXPECT_EQ(got.at, expected.at) << isovalue;
     }

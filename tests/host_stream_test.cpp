@@ -8,7 +8,7 @@
 #include <numeric>
 
 #include "core/base/error.hpp"
-#include "core/render/renderer.hpp"
+#include "core/render/device_renderer.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/run_program.hpp"
 #include "tests/test_pipelines.hpp"
@@ -47,7 +47,7 @@ class HostStreamOnDevice : public testing::TestWithParam<PipelineOnDevice> {
  protected:
   bool is_slow() const { return is_llvmpipe(device_.info()); }
 
-  Renderer renderer_of(const CompressedVolume &volume, RendererOptions options) {
+  DeviceRenderer renderer_of(const CompressedVolume &volume, RendererOptions options) {
     options.stream = StreamPlace::kHost;
     return {device_, volume, GetParam().with(options)};
   }
@@ -56,7 +56,7 @@ class HostStreamOnDevice : public testing::TestWithParam<PipelineOnDevice> {
   /// view twice.
   void check(const TestVolume &volume, const RendererOptions &options) {
     SCOPED_TRACE(fmt::format("{} slots, window of {}", options.cache_slots, options.window_blocks));
-    Renderer renderer = renderer_of(volume.compressed, options);
+    DeviceRenderer renderer = renderer_of(volume.compressed, options);
     const bool is_simulated = is_simulator(device_.info());
     for (const Camera &camera : orbit_cameras(volume.info(), is_simulated ? 1 : 2)) {
       const auto expected = twin_hits(volume, camera, options.size, kIsovalue);
@@ -89,7 +89,7 @@ INSTANTIATE_TEST_SUITE_P(Devices, HostStreamOnDevice, testing::ValuesIn(pipeline
 TEST_P(HostStreamOnDevice, SmallFrameIsTheTwins) {
   const TestVolume volume = small_volume();
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
-  Renderer renderer =
+  DeviceRenderer renderer =
       renderer_of(volume.compressed, {.size = kTiny, .cache_slots = 20, .window_blocks = 8});
   renderer.render({camera, kIsovalue});
   expect_same_hits(renderer.hits(), twin_hits(volume, camera, kTiny, kIsovalue), kTiny.width);
@@ -138,7 +138,7 @@ TEST_P(HostStreamOnDevice, AwkwardRates) {
 TEST_P(HostStreamOnDevice, WarmFrameUploadsNothing) {
   const TestVolume volume = small_volume();
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
-  Renderer renderer = renderer_of(volume.compressed, {.size = kSmall});
+  DeviceRenderer renderer = renderer_of(volume.compressed, {.size = kSmall});
   EXPECT_GT(renderer.render({camera, kIsovalue}).uploaded_blocks, 0u);
   EXPECT_EQ(renderer.render({camera, kIsovalue}).uploaded_blocks, 0u);
   EXPECT_EQ(renderer.render({camera, kIsovalue}).uploaded_bytes, 0u);
@@ -149,7 +149,7 @@ TEST_P(HostStreamOnDevice, WarmFrameUploadsNothing) {
 TEST_P(HostStreamOnDevice, CancelledFrameLeavesNoTrace) {
   const TestVolume volume = small_volume();
   const auto cameras = orbit_cameras(volume.info(), 2);
-  Renderer renderer =
+  DeviceRenderer renderer =
       renderer_of(volume.compressed,
                   {.size = kTiny, .cache_slots = 8, .max_speculation = 2, .window_blocks = 8});
   for (const std::size_t stop_after : {1u, 2u}) {
@@ -172,7 +172,7 @@ TEST_P(HostStreamOnDevice, ProfilingChangesNothing) {
   const TestVolume volume = small_volume();
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
   ocl::Device device(GetParam().device, true);
-  Renderer renderer(
+  DeviceRenderer renderer(
       device, volume.compressed,
       GetParam().with({.size = kSmall, .stream = StreamPlace::kHost, .window_blocks = 8}));
   const FrameStats stats = renderer.render({camera, kIsovalue});
@@ -196,12 +196,12 @@ TEST_P(HostStreamOnDevice, FilesAlsoCutOnes) {
   const auto expected = twin_hits(volume, cameras[0], kMedium, kIsovalue);
   for (const StreamPlace place : {StreamPlace::kDevice, StreamPlace::kHost}) {
     SCOPED_TRACE(to_string(place));
-    Renderer renderer(device_, opened,
-                      GetParam().with({.size = kMedium, .stream = place, .window_blocks = 50}));
+    DeviceRenderer renderer(
+        device_, opened, GetParam().with({.size = kMedium, .stream = place, .window_blocks = 50}));
     renderer.render({cameras[0], kIsovalue});
     expect_same_hits(renderer.hits(), expected, kMedium.width);
   }
-  Renderer renderer =
+  DeviceRenderer renderer =
       renderer_of(opened, {.size = kMedium, .cache_slots = 200, .window_blocks = 50});
   std::size_t passes = 0;
   const OnPass cut_after_one_pass = [&](const PassStats &) {
@@ -212,7 +212,9 @@ TEST_P(HostStreamOnDevice, FilesAlsoCutOnes) {
   EXPECT_EQ(std::filesystem::file_size(path), 100u);
   for (const StreamPlace place : {StreamPlace::kDevice, StreamPlace::kHost}) {
     EXPECT_THAT(
-        [&] { Renderer(device_, opened, GetParam().with({.size = kMedium, .stream = place})); },
+        [&] {
+          DeviceRenderer(device_, opened, GetParam().with({.size = kMedium, .stream = place}));
+        },
         ThrowsMessage<Error>(HasSubstr("truncated while it was in use")));
   }
   EXPECT_THAT([&] { decode_with_libzfp(opened); }, ThrowsMessage<Error>(HasSubstr("truncated")));
@@ -233,7 +235,7 @@ TEST_P(HostStreamOnDevice, SplitFramesAreTheTwins) {
   for (const std::uint32_t parts : {2u, 3u, 4u}) {
     SCOPED_TRACE(fmt::format("{} parts", parts));
     const std::uint64_t part_blocks = (volume.compressed.block_count() + parts - 1) / parts;
-    Renderer renderer(
+    DeviceRenderer renderer(
         device_, volume.compressed,
         GetParam().with(
             {.size = kMedium, .cache_slots = 300, .largest_stream_part = part_blocks * 64 + 72}));

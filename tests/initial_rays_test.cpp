@@ -1,7 +1,7 @@
 // core/initial_rays: each pixel's first block and the first wavefront, against a walk over every
 // cell.
 
-#include "core/stages/initial_rays.hpp"
+#include "core/paper/initial_rays.hpp"
 
 #include <gtest/gtest.h>
 

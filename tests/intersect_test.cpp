@@ -1,7 +1,7 @@
 // core/intersect: every pair against the portable headers on the host (equal bits), and rays
 // against closed forms in double on a plane and on a saddle, which are trilinear.
 
-#include "core/stages/intersect.hpp"
+#include "core/paper/intersect.hpp"
 
 #include <gtest/gtest.h>
 

@@ -7,7 +7,7 @@
 #include <numeric>
 
 #include "core/base/error.hpp"
-#include "core/render/renderer.hpp"
+#include "core/render/device_renderer.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/test_pipelines.hpp"
 
@@ -35,12 +35,15 @@ class InvarianceOnDevice : public testing::TestWithParam<PipelineOnDevice> {
   /// Of cases that are called Small.
   ImageSize small_size() const { return is_simulator(device_.info()) ? kTiny : kSmall; }
 
-  static bool is_blocks() { return GetParam().pipeline == PipelineKind::kBlocks; }
+  static bool is_blocks() { return GetParam().is_blocks(); }
 
   /// Draws the default view with fresh options; it must be the twin's.
   FrameStats check(const TestVolume &volume, const RendererOptions &options) {
+    return check_exactly(volume, GetParam().with(options));
+  }
+  FrameStats check_exactly(const TestVolume &volume, const RendererOptions &options) {
     const Camera camera = orbit_cameras(volume.info(), 1)[0];
-    Renderer renderer(device_, volume.compressed, GetParam().with(options));
+    DeviceRenderer renderer(device_, volume.compressed, options);
     const FrameStats stats = renderer.render({camera, kIsovalue});
     expect_same_hits(renderer.hits(), twin_hits(volume, camera, options.size, kIsovalue),
                      options.size.width);
@@ -66,12 +69,14 @@ class InvarianceOnDevice : public testing::TestWithParam<PipelineOnDevice> {
       EXPECT_EQ(c.ray_count, pixels);
       EXPECT_LE(c.active_count, pixels);
       /* Pipeline `rays` looks ahead at the end of a pass, for the rays that are left. */
-      const bool is_blocks = options.pipeline == PipelineKind::kBlocks;
+      const BlocksOptions *blocks = blocks_options(*options.pipeline);
+      const bool is_blocks = blocks != nullptr;
       const uint looking = is_blocks ? c.active_count : c.next_active_count;
       if (looking != 0) {
         const auto for_all = std::min<std::uint64_t>(options.max_speculation, pixels / looking);
         EXPECT_GE(c.spec_count, for_all);
-        EXPECT_TRUE(options.scanned_pairs || c.spec_count == for_all) << c.spec_count;
+        EXPECT_TRUE((is_blocks && blocks->scanned_pairs) || c.spec_count == for_all)
+            << c.spec_count;
         EXPECT_GE(pass.n_spec, 1);
         EXPECT_LE(pass.n_spec, options.max_speculation);
         EXPECT_LE(pass.n_spec,
@@ -88,8 +93,8 @@ class InvarianceOnDevice : public testing::TestWithParam<PipelineOnDevice> {
         EXPECT_EQ(c.active_count, stats.passes[i - 1].counts.next_active_count);
         EXPECT_EQ(c.pass, stats.passes[i - 1].counts.pass + 1);
       }
-      if (options.pipeline == PipelineKind::kBlocks) {
-        expect_consistent_pairs(c, options);
+      if (is_blocks) {
+        expect_consistent_pairs(c, options, blocks->scanned_pairs);
       } else {
         /* The first pass of a frame provides at most what a cancelled one before it left on the
          * list. */
@@ -106,9 +111,9 @@ class InvarianceOnDevice : public testing::TestWithParam<PipelineOnDevice> {
     EXPECT_EQ(stats.passes.back().counts.next_active_count == 0, !stats.cancelled);
   }
 
-  static void expect_consistent_pairs(const PassCounts &c, const RendererOptions &options) {
-    EXPECT_EQ(c.pair_slot_count,
-              options.scanned_pairs ? c.pair_count : c.window_count * c.spec_count);
+  static void expect_consistent_pairs(const PassCounts &c, const RendererOptions &options,
+                                      bool scanned_pairs) {
+    EXPECT_EQ(c.pair_slot_count, scanned_pairs ? c.pair_count : c.window_count * c.spec_count);
     EXPECT_LE(c.pair_slot_count, options.size.num_pixels());
     EXPECT_LE(c.pair_count, c.pair_slot_count);
     EXPECT_LE(c.granted_count, c.pair_count);
@@ -166,26 +171,28 @@ TEST_P(InvarianceOnDevice, SmallScannedSpeculation) {
   if (!is_blocks() || GetParam().per_ray_speculation) GTEST_SKIP() << "has no scanned speculation";
   const bool is_small = is_slow() || is_simulator(device_.info());
   const TestVolume volume = is_small ? small_volume() : medium_volume();
-  check(volume, {.size = small_size(), .scanned_pairs = true});
+  const auto check_scanned = [&](RendererOptions options) {
+    BlocksOptions of_blocks = *blocks_options(*GetParam().pipeline);
+    of_blocks.scanned_pairs = true;
+    options = GetParam().with(options);
+    options.pipeline = blocks_pipeline(of_blocks);
+    return check_exactly(volume, options);
+  };
+  check_scanned({.size = small_size()});
   if (is_simulator(device_.info())) return;  // takes it long enough
   // Few slots: rays wait, and only some take part.
-  check(volume, {.size = kTiny, .cache_slots = 20, .max_speculation = 3, .scanned_pairs = true});
+  check_scanned({.size = kTiny, .cache_slots = 20, .max_speculation = 3});
   if (is_small) return;
   for (const std::uint32_t limit : {64u, 3u}) {
     SCOPED_TRACE(limit);
     const FrameStats global = check(volume, {.size = kMedium, .max_speculation = limit}),
-                     scanned =
-                         check(volume,
-                               {.size = kMedium, .max_speculation = limit, .scanned_pairs = true});
+                     scanned = check_scanned({.size = kMedium, .max_speculation = limit});
     ASSERT_LE(scanned.passes.size(), global.passes.size());
     double more = 0;
     for (std::size_t i = 0; i < scanned.passes.size(); ++i)
       more += double(scanned.passes[i].counts.spec_count) - global.passes[i].counts.spec_count;
     EXPECT_TRUE(limit == 3 || more > 0) << "else this scene tests nothing";
   }
-  EXPECT_THROW(Renderer(device_, volume.compressed,
-                        {.size = kMedium, .pipeline = PipelineKind::kRays, .scanned_pairs = true}),
-               Error);
 }
 
 // ---- cache size
@@ -238,8 +245,8 @@ TEST_P(InvarianceOnDevice, ManyViewsThroughFewSlots) {
   for (const std::uint32_t slots : {13u, 9u, 31u}) {
     if (is_slow() && slots != 13) continue;
     SCOPED_TRACE(fmt::format("{} slots", slots));
-    Renderer renderer(device_, volume.compressed,
-                      GetParam().with({.size = size, .cache_slots = slots}));
+    DeviceRenderer renderer(device_, volume.compressed,
+                            GetParam().with({.size = size, .cache_slots = slots}));
     for (const Camera &camera : orbit_cameras(volume.info(), 2)) {
       expect_consistent(renderer.render({camera, kIsovalue}), renderer.options());
       expect_same_hits(renderer.hits(), twin_hits(volume, camera, size, kIsovalue), size.width);
@@ -285,7 +292,7 @@ TEST_P(InvarianceOnDevice, ImageShapes) {
 TEST_P(InvarianceOnDevice, WarmCacheDecodesNothing) {
   const TestVolume volume = small_volume();
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
-  Renderer renderer(device_, volume.compressed, GetParam().with({.size = kSmall}));
+  DeviceRenderer renderer(device_, volume.compressed, GetParam().with({.size = kSmall}));
   const FrameStats cold = renderer.render({camera, kIsovalue});
   const auto hits = renderer.hits();
   const FrameStats warm = renderer.render({camera, kIsovalue});
@@ -312,8 +319,8 @@ TEST_P(InvarianceOnDevice, FramesInAnyOrderEqualFreshRenderers) {
   std::mt19937 random(kSeed);
   SCOPED_TRACE(fmt::format("seed {}", kSeed));
   for (const std::uint32_t slots : {0u, 150u}) {
-    Renderer renderer(device_, volume.compressed,
-                      GetParam().with({.size = kFrame, .cache_slots = slots}));
+    DeviceRenderer renderer(device_, volume.compressed,
+                            GetParam().with({.size = kFrame, .cache_slots = slots}));
     std::shuffle(frames.begin(), frames.end(), random);
     for (const Frame &frame : frames) {
       SCOPED_TRACE(
@@ -329,8 +336,8 @@ TEST_P(InvarianceOnDevice, FramesInAnyOrderEqualFreshRenderers) {
 
 TEST_P(InvarianceOnDevice, MemoryIsFixedBeforeTheFirstFrame) {
   const TestVolume volume = small_volume();
-  Renderer renderer(device_, volume.compressed,
-                    GetParam().with({.size = kTiny, .cache_slots = 20}));
+  DeviceRenderer renderer(device_, volume.compressed,
+                          GetParam().with({.size = kTiny, .cache_slots = 20}));
   const ocl::MemoryLedger &ledger = device_.ledger();
   const std::uint64_t current = ledger.current(), peak = ledger.peak();
   EXPECT_GT(current, 0u);
@@ -363,7 +370,7 @@ TEST_P(InvarianceOnDevice, PicturesOfPassesOnlyGainHits) {
   const auto of_cells = twin_hits(volume, camera, kFrame, kIsovalue, Normals::kCell);
   for (const std::uint32_t slots : {0u, 100u}) {
     SCOPED_TRACE(fmt::format("{} slots", slots));
-    Renderer renderer(
+    DeviceRenderer renderer(
         device_, volume.compressed,
         GetParam().with({.size = kFrame,
                          .cache_slots = slots,
@@ -400,8 +407,8 @@ TEST_P(InvarianceOnDevice, PicturesOfPassesOnlyGainHits) {
 TEST_P(InvarianceOnDevice, CancelledFrameLeavesNoTrace) {
   const TestVolume volume = small_volume();
   const auto cameras = orbit_cameras(volume.info(), 2);
-  Renderer renderer(device_, volume.compressed,
-                    GetParam().with({.size = kTiny, .cache_slots = 8, .max_speculation = 2}));
+  DeviceRenderer renderer(device_, volume.compressed,
+                          GetParam().with({.size = kTiny, .cache_slots = 8, .max_speculation = 2}));
   for (const std::size_t stop_after : {1u, 2u}) {
     SCOPED_TRACE(stop_after);
     std::size_t calls = 0;
@@ -426,7 +433,7 @@ TEST_P(InvarianceOnDevice, ProfilingChangesNothing) {
   const TestVolume volume = small_volume();
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
   ocl::Device device(GetParam().device, true);
-  Renderer renderer(device, volume.compressed, GetParam().with({.size = kSmall}));
+  DeviceRenderer renderer(device, volume.compressed, GetParam().with({.size = kSmall}));
   const FrameStats stats = renderer.render({camera, kIsovalue});
   expect_same_hits(renderer.hits(), twin_hits(volume, camera, kSmall, kIsovalue), kSmall.width);
   expect_consistent(stats, renderer.options());

@@ -11,7 +11,7 @@
 #include <bit>
 #include <map>
 
-#include "core/render/renderer.hpp"
+#include "core/render/device_renderer.hpp"
 #include "tests/rays_world.hpp"
 #include "tests/stage_support.hpp"
 #include "tests/test_devices.hpp"
@@ -201,7 +201,7 @@ class MarchPacketsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     std::uint64_t num_hits = 0;
     options.size = size;
     options.packets = RayPackets::kOn;
-    Renderer renderer(device_, volume.compressed, options);
+    DeviceRenderer renderer(device_, volume.compressed, options);
     for (const CameraCase &c : cameras) {
       SCOPED_TRACE(c.name);
       const FrameStats stats =
@@ -337,8 +337,8 @@ TEST_P(MarchPacketsOnDevice, FewerBlocksOnDemand) {
   const Camera camera = orbit_cameras(volume.info(), 1).front();
   std::vector<FrameStats> stats;
   for (const DecodeOnDemand on_demand : {DecodeOnDemand::kOff, DecodeOnDemand::kOn}) {
-    Renderer renderer(device_, volume.compressed,
-                      {.size = {61, 47}, .packets = RayPackets::kOn, .on_demand = on_demand});
+    DeviceRenderer renderer(device_, volume.compressed,
+                            {.size = {61, 47}, .packets = RayPackets::kOn, .on_demand = on_demand});
     stats.push_back(
         renderer.render({.camera = camera, .isovalue = kIsovalue, .normals = Normals::kCell}));
   }

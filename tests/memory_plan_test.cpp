@@ -9,7 +9,7 @@
 #include <algorithm>
 
 #include "core/base/error.hpp"
-#include "core/render/renderer.hpp"
+#include "core/render/device_renderer.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/test_pipelines.hpp"
 
@@ -64,11 +64,11 @@ TEST_P(MemoryPlanOnDevice, PlanIsWhatIsBooked) {
         SCOPED_TRACE(fmt::format("{} x {} x {}, {} bits per block, {} slots", dims.x, dims.y,
                                  dims.z, volume->compressed.bits_per_block, slots));
         ocl::Device device(GetParam().device);
-        const Renderer renderer(device, volume->compressed,
-                                GetParam().with({.size = size_,
-                                                 .cache_slots = slots,
-                                                 .stream = place,
-                                                 .with_kept_picture = slots == 8}));
+        const DeviceRenderer renderer(device, volume->compressed,
+                                      GetParam().with({.size = size_,
+                                                       .cache_slots = slots,
+                                                       .stream = place,
+                                                       .with_kept_picture = slots == 8}));
         expect_booked(device, renderer.memory_plan());
       }
     }
@@ -81,16 +81,16 @@ TEST_P(MemoryPlanOnDevice, BudgetsAreKept) {
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
   const auto expected = test::twin_hits(volume, camera, size_, kIsovalue);
   for (const StreamPlace place : {StreamPlace::kDevice, StreamPlace::kHost}) {
-    const MemoryRequest request{size_.num_pixels(), GetParam().pipeline, GetParam().grouping, 64,
-                                place};
+    const MemoryRequest request{size_.num_pixels(), GetParam().pipeline, 64, place};
     const std::uint64_t least = plan_memory(volume.compressed, request, kMinCacheSlots).peak();
     std::uint32_t last_slots = 0;
     for (const std::uint64_t budget : {least, least + 10'000, least + 50'000, least + 1'000'000}) {
       SCOPED_TRACE(
           fmt::format("stream on {}, budget {}, least {}", to_string(place), budget, least));
       ocl::Device device(GetParam().device);
-      Renderer renderer(device, volume.compressed,
-                        GetParam().with({.size = size_, .memory_budget = budget, .stream = place}));
+      DeviceRenderer renderer(
+          device, volume.compressed,
+          GetParam().with({.size = size_, .memory_budget = budget, .stream = place}));
       renderer.render({camera, kIsovalue});
       test::expect_same_hits(renderer.hits(), expected, size_.width);
       renderer.shade();
@@ -116,8 +116,7 @@ TEST_P(MemoryPlanOnDevice, TheStreamMovesToTheHostWhereTheBudgetIsTight) {
   const std::uint64_t stream_bytes = volume.compressed.word_count() * sizeof(uint);
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
   const auto expected = test::twin_hits(volume, camera, size_, kIsovalue);
-  const MemoryRequest request{size_.num_pixels(), GetParam().pipeline, GetParam().grouping, 64,
-                              StreamPlace::kHost};
+  const MemoryRequest request{size_.num_pixels(), GetParam().pipeline, 64, StreamPlace::kHost};
   const std::uint64_t least = plan_memory(volume.compressed, request, kMinCacheSlots).peak();
   EXPECT_LT(least, stream_bytes) << "else this scene tests nothing";
   std::vector<StreamPlace> places;
@@ -125,8 +124,8 @@ TEST_P(MemoryPlanOnDevice, TheStreamMovesToTheHostWhereTheBudgetIsTight) {
                                      least + 2 * stream_bytes, least + 10 * stream_bytes}) {
     SCOPED_TRACE(fmt::format("budget {}, least {}, stream {}", budget, least, stream_bytes));
     ocl::Device device(GetParam().device);
-    Renderer renderer(device, volume.compressed,
-                      GetParam().with({.size = size_, .memory_budget = budget}));
+    DeviceRenderer renderer(device, volume.compressed,
+                            GetParam().with({.size = size_, .memory_budget = budget}));
     const FrameStats stats = renderer.render({camera, kIsovalue});
     test::expect_same_hits(renderer.hits(), expected, size_.width);
     renderer.shade();
@@ -142,8 +141,8 @@ TEST_P(MemoryPlanOnDevice, TheStreamMovesToTheHostWhereTheBudgetIsTight) {
   EXPECT_TRUE(std::is_sorted(places.rbegin(), places.rend())) << "kDevice is below kHost";
   ocl::Device device(GetParam().device);
   EXPECT_THAT(refusal([&] {
-                Renderer(device, volume.compressed,
-                         GetParam().with({.size = size_, .memory_budget = least - 1}));
+                DeviceRenderer(device, volume.compressed,
+                               GetParam().with({.size = size_, .memory_budget = least - 1}));
               }),
               HasSubstr(fmt::format("{} would do", least)));
 }
@@ -152,7 +151,7 @@ TEST_P(MemoryPlanOnDevice, TheStreamMovesToTheHostWhereTheBudgetIsTight) {
 /// never left.
 TEST_P(MemoryPlanOnDevice, SmallPlacesOfTheStreamWithSlotsAskedFor) {
   const TestVolume volume({17, 18, 19}, test::noise_field(3), 32);
-  MemoryRequest request{size_.num_pixels(), GetParam().pipeline, GetParam().grouping, 64};
+  MemoryRequest request{size_.num_pixels(), GetParam().pipeline, 64};
   const auto plan_of = [&](std::uint64_t budget, std::uint32_t slots) {
     return plan_with_slots(volume.compressed, request, budget, slots);
   };
@@ -176,12 +175,12 @@ TEST_P(MemoryPlanOnDevice, SmallPlacesOfTheStreamWithSlotsAskedFor) {
 
 TEST_P(MemoryPlanOnDevice, SmallBudgetsTooSmallAreRefusedWithTheOneThatWouldDo) {
   const TestVolume volume({9, 10, 11}, test::noise_field(3), 8);
-  const MemoryRequest request{size_.num_pixels(), GetParam().pipeline, GetParam().grouping, 64};
+  const MemoryRequest request{size_.num_pixels(), GetParam().pipeline, 64};
   const std::uint64_t least = plan_memory(volume.compressed, request, kMinCacheSlots).peak();
   ocl::Device device(GetParam().device);
   const auto render_within = [&](std::uint64_t budget, std::uint32_t slots) {
-    Renderer(device, volume.compressed,
-             GetParam().with({.size = size_, .memory_budget = budget, .cache_slots = slots}));
+    DeviceRenderer(device, volume.compressed,
+                   GetParam().with({.size = size_, .memory_budget = budget, .cache_slots = slots}));
   };
   EXPECT_THAT(refusal([&] { render_within(least - 1, 0); }),
               HasSubstr(fmt::format("{} would do", least)));
@@ -222,12 +221,12 @@ TEST_P(MemoryPlanOfLevelsOnDevice, PeakOfSetupIsPlanned) {
   ArrayReader reader(test::grid_info(dims), test::sample(dims, test::noise_field(3)));
   const CompressedVolume volume = compress(reader, CompressOptions{.rate = 8, .levels = 2});
   ocl::Device device(GetParam());
-  const Renderer renderer(device, volume,
-                          {.size = {9, 7},
-                           .cache_slots = 8,
-                           .stream = StreamPlace::kHost,
-                           .window_blocks = 1024,
-                           .with_levels = true});
+  const DeviceRenderer renderer(device, volume,
+                                {.size = {9, 7},
+                                 .cache_slots = 8,
+                                 .stream = StreamPlace::kHost,
+                                 .window_blocks = 1024,
+                                 .with_levels = true});
   const MemoryPlan &plan = renderer.memory_plan();
   EXPECT_GT(plan.setup_bytes, plan.total()) << "else this scene tests nothing";
   EXPECT_EQ(device.ledger().peak(), plan.setup_bytes);
@@ -300,16 +299,13 @@ TEST_P(MemoryPlanOfLevelsOnDevice, GrownPlansArePlans) {
                      test::sample({40, 41, 42}, test::noise_field(3)));
   const CompressedVolume volume = compress(reader, CompressOptions{.rate = 8, .levels = 2});
   for (const StreamPlace place : {StreamPlace::kDevice, StreamPlace::kHost}) {
-    for (const auto &[pipeline, grouping, levels] :
-         {std::tuple(PipelineKind::kRays, Grouping::kCounting, true),
-          {PipelineKind::kBlocks, Grouping::kCounting, false},
-          {PipelineKind::kBlocks, Grouping::kRadix, false}}) {
+    for (const PipelinePtr &pipeline :
+         {rays_pipeline(), blocks_pipeline(), blocks_pipeline({.grouping = Grouping::kRadix})}) {
       const MemoryRequest request{.num_rays = 500,
                                   .pipeline = pipeline,
-                                  .grouping = grouping,
                                   .stream = place,
                                   .window_blocks = 8,
-                                  .with_levels = levels};
+                                  .with_levels = pipeline->has_levels()};
       const MemoryPlan grown = resized(plan_memory(volume, request, 20), 300),
                        planned = plan_memory(volume, request, 300);
       EXPECT_EQ(grown.cache_slots, planned.cache_slots);
@@ -333,18 +329,18 @@ class GrowingCacheOnDevice : public testing::TestWithParam<PipelineOnDevice> {
   const std::vector<HitRecord> expected_ = test::twin_hits(volume_, camera_, size_, kIsovalue);
   ocl::Device device_{GetParam().device};
 
-  Renderer renderer_of(RendererOptions options) {
+  DeviceRenderer renderer_of(RendererOptions options) {
     options.size = size_;
     return {device_, volume_.compressed, GetParam().with(options)};
   }
-  FrameStats draw(Renderer &renderer, const FrameRequest &request) {
+  FrameStats draw(DeviceRenderer &renderer, const FrameRequest &request) {
     const FrameStats stats = renderer.render(request);
     if (!stats.cancelled) test::expect_same_hits(renderer.hits(), expected_, size_.width);
     EXPECT_EQ(device_.ledger().current(), renderer.memory_plan().total());
     EXPECT_EQ(renderer.options().cache_slots, renderer.memory_plan().cache_slots);
     return stats;
   }
-  FrameStats draw(Renderer &renderer) {
+  FrameStats draw(DeviceRenderer &renderer) {
     return draw(renderer, {.camera = camera_, .isovalue = kIsovalue});
   }
   static std::uint64_t decoded(const FrameStats &stats) {
@@ -357,7 +353,7 @@ INSTANTIATE_TEST_SUITE_P(Devices, GrowingCacheOnDevice, testing::ValuesIn(pipeli
                          pipeline_test_name);
 
 TEST_P(GrowingCacheOnDevice, UntilAFrameFits) {
-  Renderer renderer = renderer_of({.first_slots = 16});
+  DeviceRenderer renderer = renderer_of({.first_slots = 16});
   const std::uint64_t planned =
       resized(renderer.memory_plan(), renderer.memory_plan().most_slots).peak();
   EXPECT_EQ(renderer.memory_plan().most_slots, volume_.compressed.block_count());
@@ -382,7 +378,7 @@ TEST_P(GrowingCacheOnDevice, NotWhereSlotsOrABudgetAreGiven) {
        {RendererOptions{.cache_slots = 16, .first_slots = 16},
         RendererOptions{.memory_budget = renderer_of({.cache_slots = 16}).memory_plan().peak(),
         .first_slots = 9}}) {
-    Renderer renderer = renderer_of(options);
+    DeviceRenderer renderer = renderer_of(options);
     const std::uint32_t slots = renderer.memory_plan().cache_slots;
     EXPECT_FALSE(renderer.memory_plan().can_grow());
     for (int frame = 0; frame < 2; ++frame) draw(renderer);
@@ -397,7 +393,7 @@ TEST_P(GrowingCacheOnDevice, WhereMemoryIsShort) {
   for (const bool less : {true, false}) {
     SCOPED_TRACE(less);
     if (!less && is_slow_) break;
-    Renderer renderer = renderer_of({.first_slots = 24});
+    DeviceRenderer renderer = renderer_of({.first_slots = 24});
     draw(renderer);
     device_.ledger().set_limit(device_.ledger().current() - (less ? 1 : 0));
     draw(renderer);
@@ -414,7 +410,7 @@ TEST_P(GrowingCacheOnDevice, WhereMemoryIsShort) {
 TEST_P(GrowingCacheOnDevice, AfterFramesThatWereStopped) {
   for (const std::size_t last : {1u, 2u, 5u}) {
     SCOPED_TRACE(last);
-    Renderer renderer = renderer_of({.first_slots = 16});
+    DeviceRenderer renderer = renderer_of({.first_slots = 16});
     FrameRequest stopped{.camera = camera_, .isovalue = kIsovalue};
     std::size_t num_passes = 0;
     stopped.on_pass = [&](const PassStats &) { return ++num_passes < last; };
@@ -429,8 +425,8 @@ TEST_P(GrowingCacheOnDevice, AfterFramesThatWereStopped) {
 /// Ambient rays are the next frame's of those that a cache grows between, and lists of rays.
 TEST_P(GrowingCacheOnDevice, WithRaysOfAnyOrigin) {
   if (is_simulator(GetParam().device)) GTEST_SKIP() << "takes a simulator too long";
-  Renderer ample = renderer_of({.with_given_rays = true}),
-           renderer = renderer_of({.first_slots = 16, .with_given_rays = true});
+  DeviceRenderer ample = renderer_of({.with_given_rays = true}),
+                 renderer = renderer_of({.first_slots = 16, .with_given_rays = true});
   const FrameRequest request{.camera = camera_, .isovalue = kIsovalue, .ambient_rays = 2};
   const std::vector<WorldRay> rays(3, {camera_.eye, camera_.at - camera_.eye});
   ample.render(request);
@@ -454,12 +450,12 @@ TEST_P(MemoryPlanOfLevelsOnDevice, CachesOfLevelsGrow) {
   const FrameRequest request{.camera = camera, .isovalue = kIsovalue, .voxel_pixels = 1};
   for (const StreamPlace place : {StreamPlace::kDevice, StreamPlace::kHost}) {
     ocl::Device device(GetParam());
-    Renderer ample(device, volume, {.size = size, .stream = place, .with_levels = true});
+    DeviceRenderer ample(device, volume, {.size = size, .stream = place, .with_levels = true});
     ample.render(request);
     const std::vector<HitRecord> expected = ample.hits();
     const std::uint64_t others = device.ledger().current();
-    Renderer renderer(device, volume,
-                      {.size = size, .first_slots = 16, .stream = place, .with_levels = true});
+    DeviceRenderer renderer(
+        device, volume, {.size = size, .first_slots = 16, .stream = place, .with_levels = true});
     for (int frame = 0; frame < 3; ++frame) {
       renderer.render(request);
       test::expect_same_hits(renderer.hits(), expected, size.width);

@@ -1,7 +1,7 @@
-// core/extract/mesh_renderer: its hits have the bits of the twin, with any budget; they are those
+// core/paper/mesh_renderer: its hits have the bits of the twin, with any budget; they are those
 // of the ray pipelines as far as triangles can be the trilinear surface.
 
-#include "core/extract/mesh_renderer.hpp"
+#include "core/paper/mesh_renderer.hpp"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "core/base/error.hpp"
-#include "core/render/renderer.hpp"
+#include "core/render/device_renderer.hpp"
 #include "reference/raster_twin.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/test_devices.hpp"
@@ -183,7 +183,7 @@ TEST_P(MeshRendererOnDevice, DepthIsThatOfTheRaysAsFarAsTrianglesAllow) {
   const double off = 0.375 / radius + 1.5 * 0.25 / radius + 0.0035 + 0.002;
   const double grazing = 0.5;  // cosine of ray and normal
   for (const Camera &camera : orbit_cameras(volume.info(), 3)) {
-    Renderer rays(device_, volume.compressed, {.size = kMedium});
+    DeviceRenderer rays(device_, volume.compressed, {.size = kMedium});
     rays.render({.camera = camera, .isovalue = 0});
     MeshRenderer mesh(device_, volume.compressed, {.size = kMedium});
     mesh.render(camera, 0);
@@ -211,7 +211,7 @@ TEST_P(MeshRendererOnDevice, DepthIsThatOfTheRaysAsFarAsTrianglesAllow) {
 TEST_P(MeshRendererOnDevice, SheetsAreThoseOfTheRays) {
   const TestVolume volume({48, 40, 44}, test::gyroid_field(16), 16);
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
-  Renderer rays(device_, volume.compressed, {.size = kMedium});
+  DeviceRenderer rays(device_, volume.compressed, {.size = kMedium});
   rays.render({.camera = camera, .isovalue = 0.3f});
   MeshRenderer mesh(device_, volume.compressed, {.size = kMedium});
   mesh.render(camera, 0.3f);

@@ -20,9 +20,9 @@
 #include "core/accuracy/certify.hpp"
 #include "core/base/error.hpp"
 #include "core/extract/extractor.hpp"
-#include "core/extract/mesh_renderer.hpp"
 #include "core/host/host_renderer.hpp"
-#include "core/render/renderer.hpp"
+#include "core/paper/mesh_renderer.hpp"
+#include "core/render/device_renderer.hpp"
 #include "core/zfp/level_bounds.hpp"
 #include "core/zfp/stated_errors.hpp"
 #include "core/zfp/voxel_region.hpp"
@@ -315,7 +315,7 @@ TEST_P(NoDataFrames, SmallHolesHaveTheTwinsBits) {
                                 place == StreamPlace::kHost ? 11 : 16);
         RendererOptions options{.size = kSize};
         options.stream = place;
-        Renderer renderer(device, volume.compressed, GetParam().with(options));
+        DeviceRenderer renderer(device, volume.compressed, GetParam().with(options));
         HostRenderer host(volume.compressed);
         for (const float isovalue : {0.25f, 102.0f, 0.0f}) {
           SCOPED_TRACE(fmt::format("{}, isovalue {}", hole.name, isovalue));
@@ -342,7 +342,7 @@ TEST_P(NoDataFrames, SmallGapsAreNoHits) {
   const Hole hole = [](const glm::uvec3 &at) { return at.x >= 4 && at.x <= 6; };
   const TestVolume volume(test::grid_info(dims), with_hole(dims, source, hole), 24);
   ocl::Device device(GetParam().device);
-  Renderer renderer(device, volume.compressed, GetParam().with({.size = {8, 8}}));
+  DeviceRenderer renderer(device, volume.compressed, GetParam().with({.size = {8, 8}}));
   const Camera camera = test::camera_along({-5, 4, 4}, {1, 0.001, 0.002}, {0, 1, 0}, 10);
   renderer.render({camera, 5.0f});  // rising within the hole; falling behind the ridge is none
   for (const HitRecord &hit : renderer.hits()) EXPECT_TRUE(std::isinf(hit.t)) << hit.t;
@@ -357,7 +357,7 @@ TEST_P(NoDataFrames, SmallNormalsIgnoreThem) {
       test::sample(dims, [](const glm::dvec3 &at) { return at.x + 2 * at.y + 4 * at.z - 35; });
   const TestVolume volume(test::grid_info(dims), with_hole(dims, source, holes(dims)[2].hole), 28);
   ocl::Device device(GetParam().device);
-  Renderer renderer(device, volume.compressed, GetParam().with({.size = {24, 16}}));
+  DeviceRenderer renderer(device, volume.compressed, GetParam().with({.size = {24, 16}}));
   renderer.render({orbit_cameras(volume.info(), 3)[1], 0.5f});
   EXPECT_GT(num_hits(renderer.hits()), 20u);
   for (const HitRecord &hit : renderer.hits()) {
@@ -459,7 +459,7 @@ class NoDataLevels : public testing::TestWithParam<ocl::DeviceInfo> {
   /// Returns the number of hits.
   std::uint64_t check(const CompressedVolume &volume, float isovalue, double voxel_pixels,
                       StreamPlace place = StreamPlace::kDevice) {
-    Renderer renderer(device_, volume, {.size = kSize, .stream = place, .with_levels = true});
+    DeviceRenderer renderer(device_, volume, {.size = kSize, .stream = place, .with_levels = true});
     EXPECT_EQ(device_.ledger().current(), renderer.memory_plan().total());
     const Twin twin(volume, voxel_pixels);
     std::vector<Camera> cameras = orbit_cameras(volume.info, 2);
@@ -559,8 +559,8 @@ TEST_P(NoDataBounds, SmallCertainPixelsAreRight) {
       for (const std::uint32_t rate : {4u, 7u, 14u}) {
         const CompressedVolume volume =
             compressed(dims, holed, {.rate = rate, .measure_error = true, .levels = 2});
-        Renderer renderer(device, volume,
-                          {.size = kSize, .with_levels = true, .with_bounds = true});
+        DeviceRenderer renderer(device, volume,
+                                {.size = kSize, .with_levels = true, .with_bounds = true});
         for (const float isovalue : {0.25f, 0.0f}) {
           for (const Camera &camera : orbit_cameras(volume.info, 3)) {
             const FrameRequest request{.camera = camera, .isovalue = isovalue};
@@ -692,19 +692,19 @@ TEST_P(NoDataMeshes, SmallOtherVolumesAreDrawnAsBefore) {
   const auto expected = test::twin_hits(full, camera, kSize, 0.25f);
   std::uint64_t bytes = 0;
   for (int turn = 0; turn < 2; ++turn) {
-    Renderer renderer(device, full.compressed, {.size = kSize});
+    DeviceRenderer renderer(device, full.compressed, {.size = kSize});
     renderer.render({camera, 0.25f});
     expect_same_hits(renderer.hits(), expected, kSize.width);
     if (turn == 0) bytes = device.ledger().current();
     EXPECT_EQ(device.ledger().current(), bytes);
-    Renderer other(device, holed.compressed, {.size = kSize});
+    DeviceRenderer other(device, holed.compressed, {.size = kSize});
     EXPECT_EQ(device.ledger().current(), 2 * bytes + holed.compressed.no_data.table().size_bytes());
   }
   ocl::DeviceInfo without = GetParam();
   without.capabilities.nan = false;
   ocl::Device plain(without);
-  EXPECT_NO_THROW(Renderer(plain, full.compressed, {.size = kSize}));
-  EXPECT_THAT([&] { Renderer(plain, holed.compressed, {.size = kSize}); },
+  EXPECT_NO_THROW(DeviceRenderer(plain, full.compressed, {.size = kSize}));
+  EXPECT_THAT([&] { DeviceRenderer(plain, holed.compressed, {.size = kSize}); },
               ThrowsMessage<Error>(HasSubstr("has no NaN")));
 }
 

@@ -25,12 +25,12 @@ class QuickRendererOnDevice : public testing::TestWithParam<core::ocl::DeviceInf
     return std::unique_lock(device_->implementation().mutex);
   }
   /// A renderer of one thread on the host, so that its frames have several bands.
-  QuickRenderer make(const RendererOptions &options = {.largest = kSize, .with_levels = true},
-                     const HostRendererOptions &host = {.num_threads = 1}) const {
-    return {device_, volume_, options, host};
+  Renderer make(const RendererOptions &options = {.largest = kSize, .with_levels = true},
+                const HostRendererOptions &host = {.num_threads = 1}) const {
+    return make_quick_renderer(device_, volume_, options, host);
   }
   FrameRequest request() const {
-    return {.camera = HostRenderer(volume_).camera(10, kSize),
+    return {.camera = make_host_renderer(volume_).camera(10, kSize),
             .isovalue = 10,
             .size = kSize,
             .want_depth = true};
@@ -56,7 +56,7 @@ std::string error_of(const Call &call) {
 
 TEST_P(QuickRendererOnDevice, TheHostDrawsUntilTheDeviceIsReady) {
   std::unique_lock busy = busy_device();
-  QuickRenderer renderer = make();
+  Renderer renderer = make();
   const FrameRequest wanted = request();
   EXPECT_EQ(renderer.camera(10).eye, wanted.camera.eye);
   const Frame first = renderer.render(wanted);
@@ -74,7 +74,7 @@ TEST_P(QuickRendererOnDevice, TheHostDrawsUntilTheDeviceIsReady) {
 
 TEST_P(QuickRendererOnDevice, AFrameAtWorkIsBegunAnewByTheDevice) {
   std::unique_lock busy = busy_device();
-  QuickRenderer renderer = make();
+  Renderer renderer = make();
   FrameRequest wanted = request();
   std::vector<std::uint32_t> passes;
   wanted.on_pass = [&](const Progress &progress) {
@@ -97,7 +97,7 @@ TEST_P(QuickRendererOnDevice, AFrameAtWorkIsBegunAnewByTheDevice) {
 
 TEST_P(QuickRendererOnDevice, FramesOfTheHostCanBeStopped) {
   std::unique_lock busy = busy_device();
-  QuickRenderer renderer = make();
+  Renderer renderer = make();
   FrameRequest wanted = request();
   wanted.on_pass = [](const Progress &progress) { return progress.passes() < 2; };
   const Frame frame = renderer.render(wanted);
@@ -111,27 +111,27 @@ TEST_P(QuickRendererOnDevice, WhatTheHostCannotDrawWaits) {
   levels.voxel_pixels = 2;
   const std::vector<float> expected =
       Renderer(device_, volume_, {.largest = kSize, .with_levels = true}).render(levels).depth;
-  const auto draw = [](QuickRenderer &renderer, const FrameRequest &wanted) {
+  const auto draw = [](Renderer &renderer, const FrameRequest &wanted) {
     return std::async(std::launch::async, [&] { return renderer.render(wanted); });
   };
   {
     std::unique_lock busy = busy_device();
-    QuickRenderer renderer = make();
+    Renderer renderer = make();
     auto frame = draw(renderer, levels);
     busy.unlock();
     EXPECT_EQ(frame.get().depth, expected);
   }
   std::unique_lock busy = busy_device();
-  QuickRenderer renderer = make({.largest = kSize}, {.memory_limit = 1});
+  Renderer renderer = make({.largest = kSize}, {.memory_limit = 1});
   const FrameRequest wanted = request();
   auto frame = draw(renderer, wanted);
   busy.unlock();
-  EXPECT_EQ(frame.get().depth, HostRenderer(volume_).render(wanted).depth);
+  EXPECT_EQ(frame.get().depth, make_host_renderer(volume_).render(wanted).depth);
 }
 
 TEST_P(QuickRendererOnDevice, ErrorsOfTheDeviceComeWithTheNextFrame) {
   std::unique_lock busy = busy_device();
-  QuickRenderer renderer = make();
+  Renderer renderer = make();
   const FrameRequest wanted = request();
   EXPECT_NO_THROW(renderer.render(wanted));
   renderer.give_up();
@@ -145,11 +145,12 @@ TEST_P(QuickRendererOnDevice, ErrorsOfTheDeviceComeWithTheNextFrame) {
 TEST_P(QuickRendererOnDevice, TheHostDrawsNothingThatTheDeviceWouldRefuse) {
   EXPECT_THAT(error_of([&] { make({.largest = kSize, .memory_budget = 1000}); }),
               HasSubstr("1000"));
-  EXPECT_THAT(error_of([&] { QuickRenderer(nullptr, volume_); }), HasSubstr("needs a device"));
+  EXPECT_THAT(error_of([&] { make_quick_renderer(nullptr, volume_); }),
+              HasSubstr("needs a device"));
 }
 
 TEST_P(QuickRendererOnDevice, IsNotUsedInItsOwnOnPass) {
-  QuickRenderer renderer = make();
+  Renderer renderer = make();
   FrameRequest wanted = request();
   wanted.on_pass = [&](const Progress &) {
     EXPECT_THAT(error_of([&] { renderer.camera(10); }), HasSubstr("at work"));
@@ -161,11 +162,11 @@ TEST_P(QuickRendererOnDevice, IsNotUsedInItsOwnOnPass) {
 /// Whether it has begun to compile or not.
 TEST_P(QuickRendererOnDevice, LeavesNothingBehind) {
   for (int i = 0; i < 3; ++i) {
-    const QuickRenderer renderer = make();
+    const Renderer renderer = make();
   }
   EXPECT_EQ(device_->memory_in_use(), 0u);
   FrameRequest wanted = request();
-  QuickRenderer first = make(), second = std::move(first);
+  Renderer first = make(), second = std::move(first);
   first = make({.largest = kSize, .cache_blocks = 64});
   EXPECT_EQ(first.render(wanted).depth, second.render(wanted).depth);
 }

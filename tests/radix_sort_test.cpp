@@ -1,7 +1,7 @@
 // core/radix_sort against std::stable_sort. Values are the places of their keys before sorting, so
 // that a swap of equal keys shows.
 
-#include "core/stages/radix_sort.hpp"
+#include "core/paper/radix_sort.hpp"
 
 #include <gtest/gtest.h>
 

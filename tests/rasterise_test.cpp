@@ -1,7 +1,7 @@
-// core/stages/rasterise against its scalar twin, bit for bit, which asks every pixel about every
+// core/paper/rasterise against its scalar twin, bit for bit, which asks every pixel about every
 // triangle; the test of a ray and a triangle against the textbook's in double; no holes.
 
-#include "core/stages/rasterise.hpp"
+#include "core/paper/rasterise.hpp"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>

@@ -9,7 +9,8 @@
 
 #include "core/base/error.hpp"
 #include "core/io/open_volume.hpp"
-#include "core/render/renderer.hpp"
+#include "core/paper/blocks_pipeline.hpp"
+#include "core/render/device_renderer.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/test_devices.hpp"
 
@@ -32,7 +33,7 @@ class RenderOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
                       RendererOptions options = {}) {
     std::uint64_t hits = 0;
     options.size = size;
-    Renderer renderer(*device_, volume.compressed, options);
+    DeviceRenderer renderer(*device_, volume.compressed, options);
     for (const float isovalue : isovalues) {
       for (std::size_t view = 0; view < cameras.size(); ++view) {
         SCOPED_TRACE(fmt::format("isovalue {}, view {}", isovalue, view));
@@ -106,7 +107,7 @@ TEST_P(RenderOnDevice, SmallLaunchesOfFewRays) {
   EXPECT_GT(check(volume, cameras, {0.1f}, kSmall, {.packets = RayPackets::kOff}), 20u);
   for (const bool scanned : {false, true}) {
     EXPECT_GT(check(volume, cameras, {0.1f}, kSmall,
-                    {.pipeline = PipelineKind::kBlocks, .scanned_pairs = scanned}),
+                    {.pipeline = blocks_pipeline({.scanned_pairs = scanned})}),
               20u);
   }
 }
@@ -115,7 +116,7 @@ TEST_P(RenderOnDevice, SmallGroupsOfTwo) {
   if (is_llvmpipe(GetParam()) && !long_tests()) return;  // it compiles march for minutes, again
   pretend([](ocl::Capabilities &can) { can.max_work_group_size = 3; });
   const TestVolume volume({9, 10, 11}, test::gyroid_field(7));
-  for (const PipelineKind pipeline : {PipelineKind::kRays, PipelineKind::kBlocks}) {
+  for (const PipelinePtr &pipeline : {rays_pipeline(), blocks_pipeline()}) {
     EXPECT_GT(check(volume, {orbit_cameras(volume.info(), 1)[0]}, {0.1f}, small_size(),
                     {.pipeline = pipeline, .packets = RayPackets::kOff}),
               5u);
@@ -169,7 +170,7 @@ TEST_P(RenderOnDevice, SmallValueErrors) {
   const ImageSize size = small_size();
   for (const TestVolume &volume :
        {TestVolume(info, source, 8), TestVolume(info, source, ErrorGoal{0.001})}) {
-    Renderer renderer(*device_, volume.compressed, {.size = size});
+    DeviceRenderer renderer(*device_, volume.compressed, {.size = size});
     for (const double voxel_error : {0.0, 0.3, 0.02, 1e-9, 0.0}) {
       SCOPED_TRACE(fmt::format("{} bits per block, value error {}",
                                volume.compressed.bits_per_block, voxel_error));
@@ -192,7 +193,7 @@ TEST_P(RenderOnDevice, ValueErrorsOfIntegersAndFewValues) {
   std::vector<float> source(open()->info().num_voxels());
   open()->read_layers(0, open()->info().dims.z, source);
   const TestVolume volume(open()->info(), source, ErrorGoal{.exact = true});
-  Renderer renderer(*device_, volume.compressed, {.size = kMedium});
+  DeviceRenderer renderer(*device_, volume.compressed, {.size = kMedium});
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
   for (const double voxel_error : {0.5, 4.0, 64.0}) {
     const std::vector<float> voxels = decode_with_libzfp(volume.compressed, voxel_error);
@@ -379,7 +380,7 @@ TEST_P(RenderOnDevice, TinyAndHugeValues) {
 TEST_P(RenderOnDevice, BadOptionsAreErrors) {
   const TestVolume volume({9, 10, 11}, test::gyroid_field(7));
   const auto refused = [&](RendererOptions options) {
-    EXPECT_THROW(Renderer(*device_, volume.compressed, options), Error);
+    EXPECT_THROW(DeviceRenderer(*device_, volume.compressed, options), Error);
   };
   const RendererOptions good{.size = kSmall};
   for (const std::uint32_t slots : {1u, 7u, 0x40000001u, 0xFFFFFFFFu}) {
@@ -417,7 +418,7 @@ TEST_P(RenderOnDevice, BadOptionsAreErrors) {
 TEST_P(RenderOnDevice, BadFramesAreErrorsAndTheNextIsRight) {
   const TestVolume volume({9, 10, 11}, test::gyroid_field(7));
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
-  Renderer renderer(*device_, volume.compressed, {.size = kSmall});
+  DeviceRenderer renderer(*device_, volume.compressed, {.size = kSmall});
   EXPECT_THROW(renderer.render({camera, NAN}), Error);
   for (const Camera &bad :
        {Camera{camera.eye, camera.eye, camera.up}, Camera{camera.eye, camera.at, {0, 0, 0}},

@@ -1,12 +1,13 @@
 // The floor of the benchmarks draws what the pipelines draw: the twin's hit buffer, bit for bit.
 
-#include "core/stages/resident.hpp"
+#include "core/paper/resident.hpp"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/render/renderer.hpp"
+#include "core/paper/blocks_pipeline.hpp"
+#include "core/render/device_renderer.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/test_devices.hpp"
 
@@ -104,8 +105,8 @@ TEST_P(ResidentOnDevice, EqualsBothPipelines) {
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
   Resident resident(device_, volume.compressed, kMedium);
   resident.render(camera, 0.3f);
-  for (const PipelineKind pipeline : {PipelineKind::kBlocks, PipelineKind::kRays}) {
-    Renderer renderer(device_, volume.compressed, {.size = kMedium, .pipeline = pipeline});
+  for (const PipelinePtr &pipeline : {blocks_pipeline(), rays_pipeline()}) {
+    DeviceRenderer renderer(device_, volume.compressed, {.size = kMedium, .pipeline = pipeline});
     renderer.render({.camera = camera, .isovalue = 0.3f, .normals = Normals::kCell});
     expect_same_hits(resident.hits(), renderer.hits(), kMedium.width);
   }

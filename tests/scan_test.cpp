@@ -1,6 +1,6 @@
 // core/scan: prefix sums and compaction against std::exclusive_scan and a plain loop.
 
-#include "core/stages/scan.hpp"
+#include "core/paper/scan.hpp"
 
 #include <gtest/gtest.h>
 

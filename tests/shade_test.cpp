@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "core/base/error.hpp"
-#include "core/render/renderer.hpp"
+#include "core/render/device_renderer.hpp"
 #include "reference/twin.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/test_pipelines.hpp"
@@ -52,7 +52,7 @@ INSTANTIATE_TEST_SUITE_P(Devices, ShadeOnDevice, testing::ValuesIn(pipelines_und
 
 TEST_P(ShadeOnDevice, SmallPictureIsTheTwins) {
   constexpr ImageSize kSize{12, 8};
-  Renderer renderer(device_, volume_.compressed, GetParam().with({.size = kSize}));
+  DeviceRenderer renderer(device_, volume_.compressed, GetParam().with({.size = kSize}));
   renderer.render({camera_, 0.1f});
   const FrameParams frame = make_frame_params(volume_.info(), camera_, kSize, 0.1f);
   for (const Appearance &appearance :
@@ -73,7 +73,7 @@ TEST_P(ShadeOnDevice, SmallPixelsOfSeveralRaysAreTheirMean) {
     if (is_simulator(device_.info()) && samples != 2) continue;
     SCOPED_TRACE(fmt::format("{} x {} rays a pixel", samples, samples));
     const ImageSize size{7, 5, samples}, all_rays{7 * samples, 5 * samples};
-    Renderer renderer(device_, volume_.compressed, GetParam().with({.size = size}));
+    DeviceRenderer renderer(device_, volume_.compressed, GetParam().with({.size = size}));
     const FrameStats stats = renderer.render({camera_, 0.1f});
     const auto expected_hits = test::twin_hits(volume_, camera_, all_rays, 0.1f);
     test::expect_same_hits(renderer.hits(), expected_hits, all_rays.width);
@@ -102,7 +102,7 @@ TEST_P(ShadeOnDevice, SmallPixelsOfSeveralRaysAreTheirMean) {
 }
 
 TEST_P(ShadeOnDevice, SizesMayChangeBetweenFrames) {
-  Renderer renderer(device_, volume_.compressed, GetParam().with({.size = {20, 14, 4}}));
+  DeviceRenderer renderer(device_, volume_.compressed, GetParam().with({.size = {20, 14, 4}}));
   for (const ImageSize size : {ImageSize{20, 14, 4}, {40, 28, 2}, {80, 56}, {9, 7, 8}, {5, 4, 3}}) {
     SCOPED_TRACE(
         fmt::format("{}x{}, {} x {} rays", size.width, size.height, size.samples, size.samples));
@@ -123,7 +123,7 @@ TEST_P(ShadeOnDevice, SizesMayChangeBetweenFrames) {
 }
 
 TEST_P(ShadeOnDevice, NothingIsShownBeforeTheFirstFrame) {
-  Renderer renderer(device_, volume_.compressed, GetParam().with({.size = {12, 8}}));
+  DeviceRenderer renderer(device_, volume_.compressed, GetParam().with({.size = {12, 8}}));
   EXPECT_THROW(renderer.render({camera_, NAN}), Error);
   EXPECT_THAT([&] { renderer.hits(); }, ThrowsMessage<Error>(HasSubstr("no frame")));
   EXPECT_THAT([&] { renderer.shade(); }, ThrowsMessage<Error>(HasSubstr("no frame")));

@@ -13,7 +13,7 @@
 #include <set>
 
 #include "core/base/error.hpp"
-#include "core/render/renderer.hpp"
+#include "core/render/device_renderer.hpp"
 #include "kernels_cl/portable/smooth_gradient.h"
 #include "reference/twin.hpp"
 #include "tests/rays_world.hpp"
@@ -381,7 +381,7 @@ TEST_P(NormalsOnDevice, SmallFramesOfBothKinds) {
   const TestVolume volume(dims, test::sphere_field(dims));
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
   constexpr ImageSize kSmall{8, 6};
-  Renderer renderer(device_, volume.compressed, GetParam().with({.size = kSmall}));
+  DeviceRenderer renderer(device_, volume.compressed, GetParam().with({.size = kSmall}));
   for (const Normals normals : {Normals::kSmooth, Normals::kCell}) {
     renderer.render({.camera = camera, .isovalue = 0.5f, .normals = normals});
     expect_same_hits(renderer.hits(), twin_hits(volume, camera, kSmall, 0.5f, normals),
@@ -392,16 +392,15 @@ TEST_P(NormalsOnDevice, SmallFramesOfBothKinds) {
 TEST_P(NormalsOnDevice, StatisticsTellWhatTheyTook) {
   const TestVolume volume = volume_of_test();
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
-  Renderer renderer(device_, volume.compressed, GetParam().with({.size = kFrame}));
+  DeviceRenderer renderer(device_, volume.compressed, GetParam().with({.size = kFrame}));
   FrameRequest request{.camera = camera, .isovalue = kIsovalue, .normals = Normals::kCell};
   const FrameStats cells = renderer.render(request);
   EXPECT_EQ(cells.normals.passes, 0u);
   EXPECT_EQ(cells.normals.ms, 0);
   request.normals = Normals::kSmooth;
   const FrameStats smooth = renderer.render(request);
-  EXPECT_EQ(smooth.passes.size(),
-            GetParam().pipeline == PipelineKind::kBlocks ? cells.passes.size() : 1u);
-  if (GetParam().pipeline == PipelineKind::kRays) {  // the other asks for whole dual grids, ahead
+  EXPECT_EQ(smooth.passes.size(), GetParam().is_blocks() ? cells.passes.size() : 1u);
+  if (!GetParam().is_blocks()) {  // the other asks for whole dual grids, ahead
     EXPECT_GT(smooth.normals.passes, 1u);
     EXPECT_GT(smooth.normals.decoded_blocks, 0u);
   }
@@ -417,7 +416,7 @@ TEST_P(NormalsOnDevice, StatisticsTellWhatTheyTook) {
 TEST_P(NormalsOnDevice, FramesOfOnePassAndOfSeveralInTurn) {
   const TestVolume volume = volume_of_test();
   const auto cameras = orbit_cameras(volume.info(), 3);
-  Renderer renderer(device_, volume.compressed, GetParam().with({.size = kFrame}));
+  DeviceRenderer renderer(device_, volume.compressed, GetParam().with({.size = kFrame}));
   for (const std::size_t view : {0u, 0u, 1u, 1u, 1u, 2u, 2u, 0u, 0u}) {
     if (view == 2) renderer.clear_cache();
     if (view == 1) {  // one pass in pipeline `blocks`, too
@@ -436,8 +435,8 @@ TEST_P(NormalsOnDevice, CancelledNormalsLeaveNoTrace) {
   const auto cameras = orbit_cameras(volume.info(), 2);
   const auto cells = twin_hits(volume, cameras[0], kFrame, kIsovalue, Normals::kCell);
   const auto next = twin_hits(volume, cameras[1], kFrame, 0.1f);
-  Renderer renderer(device_, volume.compressed,
-                    GetParam().with({.size = kFrame, .cache_slots = 60}));
+  DeviceRenderer renderer(device_, volume.compressed,
+                          GetParam().with({.size = kFrame, .cache_slots = 60}));
   std::size_t num_cut = 0;
   for (std::uint32_t wanted = 0; wanted < 4; ++wanted) {
     SCOPED_TRACE(wanted);
@@ -466,8 +465,8 @@ TEST_P(NormalsOnDevice, CancelledNormalsLeaveNoTrace) {
 TEST_P(NormalsOnDevice, AFrameWhoseWatcherThrowsLeavesNoTrace) {
   const TestVolume volume = volume_of_test();
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
-  Renderer renderer(device_, volume.compressed,
-                    GetParam().with({.size = kFrame, .cache_slots = 60}));
+  DeviceRenderer renderer(device_, volume.compressed,
+                          GetParam().with({.size = kFrame, .cache_slots = 60}));
   const auto expected = twin_hits(volume, camera, kFrame, kIsovalue);
   for (int num_passes = 1; num_passes < 4; ++num_passes) {
     renderer.clear_cache();

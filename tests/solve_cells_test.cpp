@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "core/base/error.hpp"
-#include "core/render/renderer.hpp"
+#include "core/render/device_renderer.hpp"
 #include "reference/random.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/test_devices.hpp"
@@ -104,7 +104,7 @@ TEST_P(SolveCellsOnDevice, FramesOfEverySolverEqualTheTwins) {
     RendererOptions options;
     options.size = size;
     options.solver = solver_from_string(name);
-    Renderer renderer(device_, volume.compressed, options);
+    DeviceRenderer renderer(device_, volume.compressed, options);
     renderer.render({camera, 0.1f});
     test::expect_same_hits(renderer.hits(),
                            test::twin_hits(make_frame_params(volume.info(), camera, size, 0.1f),

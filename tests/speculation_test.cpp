@@ -1,6 +1,6 @@
 // core/speculation: what a pass opens with, of the counts that the last one left.
 
-#include "core/stages/speculation.hpp"
+#include "core/paper/speculation.hpp"
 
 #include <gtest/gtest.h>
 

@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/paper/scan.hpp"
 #include "core/stages/block_cache.hpp"
-#include "core/stages/scan.hpp"
 #include "core/stages/wavefront.hpp"
 #include "core/view/frame.hpp"
 #include "kernels_cl/portable/block_grid.h"

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "core/stages/group.hpp"
+#include "core/paper/group.hpp"
 #include "tests/test_devices.hpp"
 
 namespace isowave::core {

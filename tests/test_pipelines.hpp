@@ -4,7 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "core/render/renderer.hpp"
+#include "core/paper/blocks_pipeline.hpp"
+#include "core/render/device_renderer.hpp"
 #include "tests/test_devices.hpp"
 
 namespace isowave::core {
@@ -12,16 +13,13 @@ namespace isowave::core {
 struct PipelineOnDevice {
   ocl::DeviceInfo device;
   const char *name;
-  PipelineKind pipeline;
-  Grouping grouping;
-  ClosestHit closest;
+  PipelinePtr pipeline;
   bool per_ray_speculation;
   RayPackets packets = RayPackets::kAuto;
 
+  bool is_blocks() const { return blocks_options(*pipeline) != nullptr; }
   RendererOptions with(RendererOptions options) const {
     options.pipeline = pipeline;
-    options.grouping = grouping;
-    options.closest = closest;
     options.per_ray_speculation = per_ray_speculation;
     options.packets = packets;
     return options;
@@ -36,17 +34,16 @@ inline void PrintTo(const PipelineOnDevice &param, std::ostream *out) {
 inline std::vector<PipelineOnDevice> pipelines_under_test() {
   std::vector<PipelineOnDevice> params;
   for (const ocl::DeviceInfo &device : devices_under_test()) {
-    params.push_back(
-        {device, "blocks", PipelineKind::kBlocks, Grouping::kRadix, ClosestHit::kScan, false});
-    params.push_back(
-        {device, "rays_per_ray", PipelineKind::kRays, kDefaultGrouping, kDefaultClosestHit, true});
+    params.push_back({device, "blocks",
+                      blocks_pipeline({.grouping = Grouping::kRadix, .closest = ClosestHit::kScan}),
+                      false});
+    params.push_back({device, "rays_per_ray", rays_pipeline(), true});
     if (is_llvmpipe(device)) continue;
-    params.push_back({device, "blocks_counting_atomic_min", PipelineKind::kBlocks,
-                      Grouping::kCounting, ClosestHit::kAtomicMin, false});
-    params.push_back({device, "blocks_per_ray", PipelineKind::kBlocks, Grouping::kCounting,
-                      ClosestHit::kAtomicMin, true});
-    params.push_back({device, "rays", PipelineKind::kRays, kDefaultGrouping, kDefaultClosestHit,
-                      false, RayPackets::kOff});
+    const PipelinePtr counting =
+        blocks_pipeline({.grouping = Grouping::kCounting, .closest = ClosestHit::kAtomicMin});
+    params.push_back({device, "blocks_counting_atomic_min", counting, false});
+    params.push_back({device, "blocks_per_ray", counting, true});
+    params.push_back({device, "rays", rays_pipeline(), false, RayPackets::kOff});
   }
   return params;
 }

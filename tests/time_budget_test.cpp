@@ -1,7 +1,7 @@
 // Frames within a time: the steps that are drawn, what shows where time was over, and a clock that
 // this file winds itself.
 
-#include "core/render/time_budget.hpp"
+#include "core/frame/timed_renderer.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -106,15 +106,15 @@ class TimeBudgetOnDevice : public testing::TestWithParam<PipelineOnDevice> {
   TestVolume volume_;
   Camera camera_;
   ocl::Device device_;
-  Renderer renderer_;
+  DeviceRenderer renderer_;
   double ms_ = 0;
-  TimedFrames frames_;
+  TimedRenderer frames_;
 };
 INSTANTIATE_TEST_SUITE_P(Devices, TimeBudgetOnDevice, testing::ValuesIn(pipelines_under_test()),
                          pipeline_test_name);
 
 TEST_P(TimeBudgetOnDevice, HardlyAnyTimeGivesTheFewestRays) {
-  const TimedFrame frame = frames_.render({camera_, kIsovalue}, 1e-6);
+  const FrameStats frame = frames_.render(within_ms(1e-6, {camera_, kIsovalue}));
   const Hits shown = renderer_.hits();
   ASSERT_EQ(frame.steps.size(), 1u);
   EXPECT_FALSE(frame.steps[0].cancelled) << "there must be a picture";
@@ -134,7 +134,7 @@ TEST_P(TimeBudgetOnDevice, CanBeStoppedAtAnyPass) {
     sizes.push_back(renderer_.size());
     return true;
   };
-  EXPECT_FALSE(frames_.render(request, 1e9).stopped);
+  EXPECT_FALSE(frames_.render(within_ms(1e9, request)).cancelled);
   const std::size_t num_passes = sizes.size();
   ASSERT_GT(num_passes, 2u);
   EXPECT_EQ(sizes.front().width, 4u);
@@ -143,26 +143,26 @@ TEST_P(TimeBudgetOnDevice, CanBeStoppedAtAnyPass) {
     SCOPED_TRACE(last);
     std::size_t passes = 0;
     request.on_pass = [&](const PassStats &) { return ++passes < last; };
-    const TimedFrame frame = frames_.render(request, 1e9);
+    const FrameStats frame = frames_.render(within_ms(1e9, request));
     // Blocks that are cached by then save passes: the frame may be whole before.
     EXPECT_TRUE(passes == last || frame.complete);
-    EXPECT_EQ(frame.stopped, passes == last);
+    EXPECT_EQ(frame.cancelled, passes == last);
     EXPECT_EQ(renderer_.size().width, kSize.width);
     EXPECT_EQ(renderer_.hits().size(), kSize.num_rays());
     EXPECT_TRUE(last > 1 || !frame.complete);
   }
   request.on_pass = {};
-  EXPECT_TRUE(frames_.render(request, 1e9).complete);
+  EXPECT_TRUE(frames_.render(within_ms(1e9, request)).complete);
   expect_same_hits(renderer_.hits(), test::twin_hits(volume_, camera_, kSize, kIsovalue),
                    kSize.width);
 }
 
 TEST_P(TimeBudgetOnDevice, AmpleTimeGivesTheWholePicture) {
-  const TimedFrame frame = frames_.render({camera_, kIsovalue}, 1e9);
+  const FrameStats frame = frames_.render(within_ms(1e9, {camera_, kIsovalue}));
   EXPECT_EQ(frame.steps.size(), 2u) << "nothing between the first and the full picture";
   EXPECT_TRUE(frame.complete);
-  EXPECT_NEAR(frame.stats.total_ms, ms_ - kFullLook, 1e-6);
-  EXPECT_FALSE(frame.stats.cancelled);
+  EXPECT_NEAR(frame.total_ms, ms_ - kFullLook, 1e-6);
+  EXPECT_FALSE(frame.cancelled);
   expect_same_hits(renderer_.hits(), test::twin_hits(volume_, camera_, kSize, kIsovalue),
                    kSize.width);
 }
@@ -175,10 +175,10 @@ TEST_P(TimeBudgetOnDevice, ThePictureBeforeShowsThrough) {
     SCOPED_TRACE(fmt::format("budget {}", budget));
     renderer_.clear_cache();
     const double begin = ms_ + double(renderer_.size().num_pixels()) / kPixelsPerMs;
-    const TimedFrame frame = frames_.render({camera_, kIsovalue}, budget);
+    const FrameStats frame = frames_.render(within_ms(budget, {camera_, kIsovalue}));
     const Hits shown = renderer_.hits();
     ASSERT_FALSE(frame.steps.empty());
-    EXPECT_NEAR(frame.stats.total_ms, ms_ - begin, 1e-6);
+    EXPECT_NEAR(frame.total_ms, ms_ - begin, 1e-6);
     Hits expected;
     ImageSize size;  // of the step before
     for (const TimedStep &step : frame.steps) {
@@ -219,24 +219,24 @@ TEST_P(TimeBudgetOnDevice, ThePictureBeforeShowsThrough) {
 TEST_P(TimeBudgetOnDevice, BudgetIsKeptWhenPassesTakeWhatIsExpected) {
   for (double budget = 15; budget < 1000; budget *= 1.4) {
     renderer_.clear_cache();
-    const TimedFrame frame = frames_.render({camera_, kIsovalue}, budget);
+    const FrameStats frame = frames_.render(within_ms(budget, {camera_, kIsovalue}));
     const double look = double(frame.steps.back().size.num_pixels()) / kPixelsPerMs;
-    EXPECT_LE(frame.stats.total_ms, std::max(budget, frame.steps[0].ms) + 2 * look + kFullLook);
+    EXPECT_LE(frame.total_ms, std::max(budget, frame.steps[0].ms) + 2 * look + kFullLook);
   }
 }
 
 /// With several rays a pixel, steps count rays; each but the last has one for each of its pixels.
 TEST_P(TimeBudgetOnDevice, SeveralRaysAPixel) {
   constexpr ImageSize kNine{9, 7, 3};
-  Renderer renderer(device_, volume_.compressed,
-                    GetParam().with({.size = kNine, .with_kept_picture = true}));
-  TimedFrames frames(renderer);
-  const TimedFrame whole = frames.render({camera_, kIsovalue}, 1e9);
+  DeviceRenderer renderer(device_, volume_.compressed,
+                          GetParam().with({.size = kNine, .with_kept_picture = true}));
+  TimedRenderer frames(renderer);
+  const FrameStats whole = frames.render(within_ms(1e9, {camera_, kIsovalue}));
   EXPECT_TRUE(whole.complete);
   EXPECT_EQ(whole.steps.back().size.samples, 3u);
   expect_same_hits(renderer.hits(), test::twin_hits(volume_, camera_, kSize, kIsovalue),
                    kSize.width);
-  const TimedFrame coarse = frames.render({camera_, kIsovalue}, 1e-6);
+  const FrameStats coarse = frames.render(within_ms(1e-6, {camera_, kIsovalue}));
   EXPECT_EQ(coarse.steps[0].size.width, 4u);
   EXPECT_EQ(coarse.steps[0].size.samples, 1u);
   expect_same_hits(renderer.hits(), enlarged(picture_of({4, 3}), {4, 3}, kSize), kSize.width);
@@ -249,20 +249,20 @@ TEST_P(TimeBudgetOnDevice, NoTimeIsRefused) {
   for (const double budget : {0.0, -1.0, double(NAN), double(INFINITY)}) {
     EXPECT_THAT(
         [&] {
-          frames_.render({camera_, kIsovalue}, budget);
+          frames_.render(within_ms(budget, {camera_, kIsovalue}));
         },
         ThrowsMessage<Error>(HasSubstr("no picture can be drawn")));
   }
-  EXPECT_THROW(frames_.render({camera_, NAN}, 1), Error);
+  EXPECT_THROW(frames_.render(within_ms(1, {camera_, NAN})), Error);
   EXPECT_THAT(
       [&] {
-        frames_.render({camera_, kIsovalue, ImageSize{1, 27 * 21}}, 1);
+        frames_.render(within_ms(1, {camera_, kIsovalue, ImageSize{1, 27 * 21}}));
       },
       ThrowsMessage<Error>(HasSubstr("cannot be kept")));
   EXPECT_THAT([&] { renderer_.hits(); }, ThrowsMessage<Error>(HasSubstr("no frame")))
       << "nothing was drawn";
-  Renderer plain(device_, volume_.compressed, GetParam().with({.size = kSize}));
-  EXPECT_THROW(TimedFrames{plain}, Error);
+  DeviceRenderer plain(device_, volume_.compressed, GetParam().with({.size = kSize}));
+  EXPECT_THROW(TimedRenderer{plain}, Error);
   plain.render({camera_, kIsovalue});
   EXPECT_THROW(plain.keep_picture(), Error);
 }
@@ -275,16 +275,16 @@ TEST(TimeBudgetOnDevice, LevelsDrawWhatTheyAreFineEnoughFor) {
   const Camera camera = orbit_cameras(volume.info, 1)[0];
   for (const ocl::DeviceInfo &info : devices_under_test()) {
     ocl::Device device(info);
-    Renderer renderer(device, volume,
-                      {.size = kSize, .with_levels = true, .with_kept_picture = true});
-    TimedFrames frames(renderer);
-    const TimedFrame coarse = frames.render({camera, 0.5f}, 1e-6);
+    DeviceRenderer renderer(device, volume,
+                            {.size = kSize, .with_levels = true, .with_kept_picture = true});
+    TimedRenderer frames(renderer);
+    const FrameStats coarse = frames.render(within_ms(1e-6, {camera, 0.5f}));
     ASSERT_EQ(coarse.steps.size(), 1u);
     EXPECT_EQ(coarse.steps[0].voxel_pixels, 1.0);
-    EXPECT_GT(coarse.stats.first_level, 0u);
-    const TimedFrame fine = frames.render({camera, 0.5f}, 1e9);
+    EXPECT_GT(coarse.first_level, 0u);
+    const FrameStats fine = frames.render(within_ms(1e9, {camera, 0.5f}));
     EXPECT_TRUE(fine.complete);
-    EXPECT_EQ(fine.stats.last_level, 0u);
+    EXPECT_EQ(fine.last_level, 0u);
     const std::vector<float> voxels = decode_with_libzfp(volume);
     expect_same_hits(renderer.hits(),
                      test::twin_hits(make_frame_params(volume.info, camera, kSize, 0.5f), voxels),

@@ -2,7 +2,7 @@
 // arithmetic, so equal), and against slabs in double (its own, so every block that a ray crosses
 // must be there).
 
-#include "core/stages/traverse.hpp"
+#include "core/paper/traverse.hpp"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include <cmath>
 #include <vector>
 
-#include "core/stages/initial_rays.hpp"
+#include "core/paper/initial_rays.hpp"
 #include "core/stages/zfp_decode.hpp"
 #include "kernels_cl/portable/grid_dda.h"
 #include "kernels_cl/portable/ray_state.h"

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/paper/blocks_pipeline.hpp"
 #include "reference/watertight_device.hpp"
 #include "tests/test_devices.hpp"
 
@@ -10,7 +11,7 @@ namespace {
 
 class WatertightOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
  protected:
-  void expect_no_leaks(PipelineKind pipeline, RayBands bands) {
+  void expect_no_leaks(const PipelinePtr &pipeline, RayBands bands) {
     const std::uint64_t rays = is_llvmpipe(GetParam()) ? 10'000 : 200'000;
     ocl::Device device(GetParam());
     const std::vector<WatertightResult> results =
@@ -24,15 +25,15 @@ class WatertightOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
 };
 
 TEST_P(WatertightOnDevice, PipelineRays) {
-  expect_no_leaks(PipelineKind::kRays, RayBands::kOne);
+  expect_no_leaks(rays_pipeline(), RayBands::kOne);
 }
 
 TEST_P(WatertightOnDevice, PipelineBlocks) {
-  expect_no_leaks(PipelineKind::kBlocks, RayBands::kOne);
+  expect_no_leaks(blocks_pipeline(), RayBands::kOne);
 }
 
 TEST_P(WatertightOnDevice, LevelsOfDetail) {
-  expect_no_leaks(PipelineKind::kRays, RayBands::kLevels);
+  expect_no_leaks(rays_pipeline(), RayBands::kLevels);
 }
 
 INSTANTIATE_TEST_SUITE_P(Devices, WatertightOnDevice, testing::ValuesIn(devices_under_test()),

@@ -220,11 +220,10 @@ void check_gaps(const NoData &no_data, std::size_t coarsest) {
 
 /// A bit for each ray: whether says(values of the levels, ray).
 template <class Says>
-std::vector<std::uint64_t> rays_of_which(const BoundedFrames &of, const FrameRequest &request,
+std::vector<std::uint64_t> rays_of_which(const CompressedVolume &volume, bool with_levels,
+                                         const FrameRequest &request,
                                          std::span<const FrameParams> frames, const Says &says) {
-  const CompressedVolume &volume = of.volume();
-  const std::vector<const CompressedVolume *> levels =
-      levels_of(volume, of.renderer().options().with_levels);
+  const std::vector<const CompressedVolume *> levels = levels_of(volume, with_levels);
   std::vector<ValueOffset> offsets;
   std::vector<double> voxel_errors;
   for (const CompressedVolume *level : levels) {
@@ -250,19 +249,19 @@ std::vector<std::uint64_t> rays_of_which(const BoundedFrames &of, const FrameReq
 
 }  // namespace
 
-Certificate certify(BoundedFrames &frames, const FrameRequest &request,
+Certificate certify(Renderer &renderer, const CompressedVolume &volume, const FrameRequest &request,
                     std::span<const float> drawn) {
   const auto begin = std::chrono::steady_clock::now();
-  const Renderer &renderer = frames.renderer();
-  if (const Solver solver = renderer.options().solver; !finds_all(solver)) {
+  const Abilities abilities = renderer.abilities();
+  if (!finds_all(abilities.solver)) {
     throw Error(
         "the error of frames drawn with solver {} has no bound, since it may miss a surface: take "
         "bernstein",
-        to_string(solver));
+        to_string(abilities.solver));
   }
-  renderer.check(request);
-  const ImageSize size = renderer.size_of(request);
-  Team &team = frames.team();
+  check(request, abilities);
+  const ImageSize size = size_of(request, abilities);
+  Team &team = renderer.team();
   const bool is_first = team.rank() == 0;
   together(team, [&] {
     if (is_first && drawn.size() != size.num_rays())
@@ -276,15 +275,15 @@ Certificate certify(BoundedFrames &frames, const FrameRequest &request,
     of_bound.ambient_rays = 0;
     of_bound.bound = bound;
     of_bound.on_pass = {};
-    for (const PassStats &pass : frames.draw(of_bound).passes)
+    for (const PassStats &pass : renderer.render(of_bound).passes)
       decoded_blocks += pass.counts.decoded_count;
-    return frames.depth();
+    return renderer.depth();
   };
   const std::vector<float> lower = draw(FieldBound::kLower), upper = draw(FieldBound::kUpper);
   for (const std::uint64_t of_rank : gather(team, std::vector{decoded_blocks}))
     certificate.decoded_blocks += of_rank;
 
-  const std::vector<VolumeInfo> &levels = frames.levels();
+  const std::vector<VolumeInfo> levels = renderer.levels();
   const std::vector<FrameParams> level_frames =
       make_level_frames(levels, request.camera, size, request.isovalue, request.voxel_pixels);
   std::size_t coarsest = levels.size() - 1;
@@ -292,12 +291,13 @@ Certificate certify(BoundedFrames &frames, const FrameRequest &request,
   const glm::dmat3 voxel = levels[coarsest].index_to_world();
   const double cell_rounding =
       kCellRounding * (glm::length(voxel[0]) + glm::length(voxel[1]) + glm::length(voxel[2]));
-  const NoData &no_data = frames.volume().no_data;
+  const NoData &no_data = volume.no_data;
   std::vector<std::uint64_t> uncertain;
   together(team, [&] {
     check_gaps(no_data, coarsest);
     uncertain = rays_of_which(
-        frames, request, level_frames, [&](std::span<BlockValues> values, std::uint32_t ray) {
+        volume, abilities.levels, request, level_frames,
+        [&](std::span<BlockValues> values, std::uint32_t ray) {
           if (starts_between(level_frames, values, ray)) return true;
           if (no_data.empty()) return false;
           const auto [first, last] = std::minmax({double{lower[ray]}, double{upper[ray]}});
@@ -335,10 +335,9 @@ Certificate certify(BoundedFrames &frames, const FrameRequest &request,
 
 Certificate certify(Renderer &renderer, const CompressedVolume &volume, const FrameRequest &request,
                     std::span<const HitRecord> drawn) {
-  FramesOfOne frames(renderer, volume);
   std::vector<float> depth(drawn.size());
   std::ranges::transform(drawn, depth.begin(), &HitRecord::t);
-  return certify(frames, request, depth);
+  return certify(renderer, volume, request, std::span<const float>(depth));
 }
 
 CertificateSummary summarize(const Certificate &certificate, double limit) {

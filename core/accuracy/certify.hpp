@@ -14,8 +14,8 @@
 #include <span>
 #include <vector>
 
-#include "core/accuracy/bounded_frames.hpp"
-#include "core/render/renderer.hpp"
+#include "core/frame/renderer.hpp"
+#include "core/zfp/zfp_stream.hpp"
 
 namespace isowave::core {
 
@@ -30,16 +30,17 @@ struct Certificate {
 
 /// Bounds the error of a frame.
 ///
-/// frames   of renderers made with_bounds; the last frame that they draw here is another
+/// renderer made with_bounds, or a team of such; the last frame that it draws here is another
+/// volume   that this process's renderer was made for
 /// request  of the frame
 /// drawn    depth of its rays; at rank 0 alone
 /// Returns  at rank 0; at others a certificate without bounds
 /// Throws   Error, at all ranks: the volume's error is not known; the solver may miss crossings;
 ///          depths are not as many as the rays; coarser levels draw a volume with voxels without
 ///          data
-Certificate certify(BoundedFrames &frames, const FrameRequest &request,
+Certificate certify(Renderer &renderer, const CompressedVolume &volume, const FrameRequest &request,
                     std::span<const float> drawn);
-/// The same of one renderer's frame. volume: what it was made for; drawn: its hits.
+/// The same, of a frame's hits.
 Certificate certify(Renderer &renderer, const CompressedVolume &volume, const FrameRequest &request,
                     std::span<const HitRecord> drawn);
 

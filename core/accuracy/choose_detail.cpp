@@ -99,11 +99,6 @@ void advise(const CompressedVolume &volume, double error, double max_surface_err
 
 }  // namespace
 
-void check_max_surface_error(double max_surface_error) {
-  if (!(max_surface_error > 0) || !std::isfinite(max_surface_error))
-    throw Error("an error of {} pixels cannot be kept: give more than 0", max_surface_error);
-}
-
 RendererOptions with_choices(RendererOptions options, const CompressedVolume &volume) {
   options.with_bounds = true;
   options.with_levels = !volume.coarser_levels.empty();
@@ -116,15 +111,15 @@ FrameRequest with_detail(FrameRequest request, const Detail &detail) {
   return request;
 }
 
-DetailChoice choose_detail(BoundedFrames &frames, const FrameRequest &request,
-                           double max_surface_error) {
+DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, double rate,
+                           const FrameRequest &request, double max_surface_error) {
   check_max_surface_error(max_surface_error);
   const auto begin = std::chrono::steady_clock::now();
-  const Renderer &renderer = frames.renderer();
-  const CompressedVolume &volume = frames.volume();
-  Team &team = frames.team();
-  renderer.check(request);
-  const ImageSize size = renderer.size_of(request);
+  Team &team = renderer.team();
+  const Abilities abilities = renderer.abilities();
+  check(request, abilities);
+  const ImageSize size = size_of(request, abilities);
+  const std::vector<VolumeInfo> levels = renderer.levels();
   const std::uint32_t pixels = std::clamp(size.height / kMinRows, 1u, kMaxStride);
   const ImageSize small{std::max(size.width / pixels, 1u), size.height / pixels};
   const double stride = double(size.height) / small.height;
@@ -137,11 +132,11 @@ DetailChoice choose_detail(BoundedFrames &frames, const FrameRequest &request,
     sample.ambient_rays = 0;
     sample.size = small;
     sample.on_pass = {};
-    frames.draw(sample);
-    std::vector<float> depth = frames.depth();
+    renderer.render(sample);
+    std::vector<float> depth = renderer.depth();
     const CertificateSummary summary =
-        of_first(team,
-                 std::vector{summarize(certify(frames, sample, depth), max_surface_error / stride)})
+        of_first(team, std::vector{summarize(certify(renderer, volume, sample, depth),
+                                             max_surface_error / stride)})
             .front();
     const double all = std::max<double>(double(summary.num_pixels), 1);
     choice.tries.push_back(
@@ -166,17 +161,17 @@ DetailChoice choose_detail(BoundedFrames &frames, const FrameRequest &request,
     return found == numbers.end() ? 0.0 : *found;
   };
   // Beside voxels without data, coarser levels have no bound.
-  if (choice.reachable && frames.levels().size() > 1 && volume.no_data.empty()) {
+  if (choice.reachable && levels.size() > 1 && volume.no_data.empty()) {
     const double coarsest = first_to_suffice(all_voxel_pixels(), [](double voxel_pixels) {
       return Detail{voxel_pixels, 0};
     });
     const std::vector<FrameParams> level_frames =
-        make_level_frames(frames.levels(), request.camera, size, request.isovalue, coarsest);
+        make_level_frames(levels, request.camera, size, request.isovalue, coarsest);
     const double share =
         of_first(team, std::vector{blocks_share(finest_depth, level_frames)}).front();
     if (share <= kMaxBlocksShare) choice.detail.voxel_pixels = coarsest;
   }
-  if (choice.reachable && frames.rate() > kMinPlaneRate && !volume.precision.is_reversible()) {
+  if (choice.reachable && rate > kMinPlaneRate && !volume.precision.is_reversible()) {
     choice.detail.voxel_error =
         first_to_suffice(voxel_errors(volume, error), [&](double voxel_error) {
           return Detail{choice.detail.voxel_pixels, voxel_error};
@@ -184,12 +179,6 @@ DetailChoice choose_detail(BoundedFrames &frames, const FrameRequest &request,
   }
   choice.total_ms = ms_since(begin);
   return choice;
-}
-
-DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume,
-                           const FrameRequest &request, double max_surface_error) {
-  FramesOfOne frames(renderer, volume);
-  return choose_detail(frames, request, max_surface_error);
 }
 
 }  // namespace isowave::core

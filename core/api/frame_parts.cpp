@@ -1,8 +1,11 @@
 #include "core/api/frame_parts.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <type_traits>
 
 #include "core/api/convert.hpp"
 #include "core/base/error.hpp"
@@ -39,7 +42,7 @@ FrameStatistics public_statistics(const core::FrameStats &stats, std::uint64_t n
   result.last_level = static_cast<std::uint32_t>(stats.last_level);
   result.total_ms = stats.total_ms;
   result.cancelled = stats.cancelled;
-  result.complete = !stats.cancelled;
+  result.complete = stats.complete;
   return result;
 }
 
@@ -141,19 +144,57 @@ core::FrameRequest core_request(const FrameRequest &request, const core::Compres
   result.normals =
       shows_normals ? static_cast<core::Normals>(request.normals) : core::Normals::kCell;
   if (request.want_picture || request.on_pass) result.ambient_rays = request.ambient_rays;
+  result.max_surface_error = request.max_surface_error;
+  result.time_budget_ms = request.time_budget_ms;
   return result;
 }
 
-void check_bounds(const FrameRequest &request, const RendererOptions &options) {
-  const bool sets_detail = request.voxel_pixels != 0 || request.voxel_error != 0;
-  if (request.max_surface_error && sets_detail)
-    throw core::Error(
-        "max_surface_error chooses the detail: leave out voxel_pixels and voxel_error");
-  if (!request.max_surface_error && !request.want_bounds) return;
+void check_wanted(const FrameRequest &request, const core::Abilities &abilities) {
+  if ((request.want_positions || request.want_hits) && !abilities.cells)
+    throw core::Error("a team's hits have no cells: leave out want_positions and want_hits");
+  if (!request.want_bounds) return;
+  if (request.time_budget_ms)
+    throw core::Error("a picture within a time has no bounds of its error: leave out want_bounds");
   if (request.bound != FieldBound::kNone)
     throw core::Error("the surface of a bound has no error: draw the volume itself");
-  if (!options.with_bounds)
-    throw core::Error("bounds of the error need a renderer that was made with_bounds");
+  if (!abilities.bounds) {
+    throw core::Error(
+        "this renderer knows no bounds of the error: leave out want_bounds, or draw on a device by "
+        "a renderer that was made with_bounds");
+  }
+}
+
+bool can_draw(const FrameRequest &request, const core::Abilities &abilities,
+              const core::CompressedVolume &volume) {
+  try {
+    check_wanted(request, abilities);
+    core::check(core_request(request, volume), abilities);
+    return true;
+  } catch (const core::Error &) {
+    return false;
+  }
+}
+
+std::string text_of(const FrameRequest &request) {
+  std::string text;
+  const auto add = [&]<class Value>(const Value &value) {
+    if constexpr (std::is_enum_v<Value>) {
+      text += fmt::format("{} ", static_cast<int>(value));
+    } else {
+      text += fmt::format("{} ", value);
+    }
+  };
+  for_each_field(request, [&]<class Field>(const char *, const Field &field) {
+    if constexpr (requires { field.has_value(); }) {
+      add(field.has_value());
+      add(field.value_or(0));
+    } else if constexpr (requires { field.begin(); }) {
+      for (const auto &value : field) add(value);
+    } else {
+      add(field);
+    }
+  });
+  return text;
 }
 
 bool ProgressInTurns::show(const core::PassStats &pass,

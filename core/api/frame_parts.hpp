@@ -4,15 +4,12 @@
 #include <functional>
 #include <mutex>
 #include <span>
+#include <string>
 #include <vector>
 
-#include "core/accuracy/choose_detail.hpp"
-#include "core/frame/appearance.hpp"
-#include "core/frame/frame_request.hpp"
-#include "core/view/given_rays.hpp"
+#include "core/frame/renderer.hpp"
 #include "core/zfp/zfp_stream.hpp"
 #include "isowave/frame.hpp"
-#include "isowave/renderer.hpp"
 
 namespace isowave {
 
@@ -22,8 +19,13 @@ core::Appearance core_appearance(const Appearance &appearance);
 /// What is drawn of the volume, and how precisely; without on_pass.
 core::FrameRequest core_request(const FrameRequest &request, const core::CompressedVolume &volume);
 
-/// Throws  core::Error: bounds, or a choice of detail, that cannot be had
-void check_bounds(const FrameRequest &request, const RendererOptions &options);
+/// Throws  core::Error: the request wants of the frame what a renderer of these abilities has not
+void check_wanted(const FrameRequest &request, const core::Abilities &abilities);
+/// Whether a renderer of these abilities draws the request.
+bool can_draw(const FrameRequest &request, const core::Abilities &abilities,
+              const core::CompressedVolume &volume);
+/// All that the processes of a team must ask for alike.
+std::string text_of(const FrameRequest &request);
 
 /// A Progress that any number of threads may look at: pictures take turns, and between two calls of
 /// on_pass, while the frame is drawn, there are none.

@@ -8,146 +8,154 @@
 #include <thread>
 #include <utility>
 
+#include "core/api/device_implementation.hpp"
+#include "core/api/frame_parts.hpp"
 #include "core/api/guarded.hpp"
-#include "core/api/turns.hpp"
+#include "core/api/renderer_implementation.hpp"
+#include "core/api/volume_implementation.hpp"
 #include "core/base/error.hpp"
+#include "core/host/host_renderer.hpp"
+#include "core/render/renderer_options.hpp"
 
 namespace isowave {
 
-struct QuickRenderer::Implementation {
-  Implementation(std::shared_ptr<Device> device, std::shared_ptr<const Volume> volume_drawn,
-                 const RendererOptions &options, const HostRendererOptions &of_host)
-      : volume(std::move(volume_drawn)), size(options.largest), host_options(of_host) {
-    maker = std::jthread([this, device = std::move(device), options](const std::stop_token &stop) {
-      make(device, options, stop);
-    });
+namespace {
+
+/// A renderer of the host until one of the device is made.
+class QuickImplementation : public Renderer::Implementation {
+ public:
+  QuickImplementation(const std::shared_ptr<Device> &on, std::shared_ptr<const Volume> of,
+                      const RendererOptions &options, const HostRendererOptions &of_host)
+      : size_(options.largest), host_options_(of_host) {
+    device = on;
+    volume = std::move(of);
+    device_info = on->info();
+    grid = volume->grid();
+    notices = volume->notices();
+    maker_ = std::jthread([this, options](const std::stop_token &stop) { make(options, stop); });
   }
 
-  void make(const std::shared_ptr<Device> &device, const RendererOptions &options,
-            const std::stop_token &stop);
-  Renderer &device_renderer();
-  HostRenderer *host_renderer();
+  Frame render(const FrameRequest &request) override {
+    const std::lock_guard lock(turns_);
+    return draw(request);
+  }
+  Frame cast_rays(std::span<const Ray> rays, double isovalue, Normals normals) override {
+    const std::lock_guard lock(turns_);
+    return any_renderer().cast_rays(rays, isovalue, normals);
+  }
+  Camera camera(double isovalue, std::optional<ImageSize> size) override {
+    const std::lock_guard lock(turns_);
+    return any_renderer().camera(isovalue, size.value_or(size_));
+  }
+  /// What the device can; before ready(), this waits.
+  bool can_draw(const FrameRequest &request) const override {
+    return device_renderer().can_draw(request);
+  }
+  bool ready() const override { return done_; }
+  bool ready_for(const FrameRequest &request) const override {
+    return done_ || host_can_draw(request);
+  }
+  void wait() const override { device_renderer(); }
+  void give_up() override { maker_.request_stop(); }
+  std::string isovalue_notice(double isovalue) const override {
+    return volume->isovalue_notice(isovalue);
+  }
+  std::uint64_t memory_bytes() const override { return done_ && made_ ? made_->memory_bytes() : 0; }
+  double setup_ms() const override { return done_ && made_ ? made_->setup_ms() : 0; }
+
+ private:
+  void make(const RendererOptions &options, const std::stop_token &stop);
+  Renderer &device_renderer() const;
+  Renderer *host_renderer();
+  Renderer &any_renderer();
+  bool host_can_draw(const FrameRequest &request) const {
+    return isowave::can_draw(request, core::HostRenderer::all_abilities(),
+                             volume->implementation().volume);
+  }
   Frame draw(const FrameRequest &request);
 
-  std::shared_ptr<const Volume> volume;
-  ImageSize size;  ///< of the largest picture
-  HostRendererOptions host_options;
-  Turns mutex;                       ///< one frame at a time
-  std::optional<HostRenderer> host;  ///< from the first frame on that the host draws
-  bool has_host = true;              ///< false: the volume cannot be drawn there
-  // Written by the thread that makes the renderer, and read by others once done is true.
-  std::optional<Renderer> made;
-  std::exception_ptr failure;
-  std::atomic<bool> done = false;
-  std::jthread maker;  ///< the last member: it ends before the others go
+  ImageSize size_;  ///< of the largest picture
+  HostRendererOptions host_options_;
+  Turns turns_;                   ///< one frame at a time
+  std::optional<Renderer> host_;  ///< from the first frame on that the host draws
+  bool has_host_ = true;          ///< false: the volume cannot be drawn there
+  // Written by the thread that makes the renderer, and read by others once done_ is true.
+  mutable std::optional<Renderer> made_;
+  std::exception_ptr failure_;
+  std::atomic<bool> done_ = false;
+  std::jthread maker_;  ///< the last member: it ends before the others go
 };
 
-void QuickRenderer::Implementation::make(const std::shared_ptr<Device> &device,
-                                         const RendererOptions &options,
-                                         const std::stop_token &stop) {
+void QuickImplementation::make(const RendererOptions &options, const std::stop_token &stop) {
   try {
-    made.emplace(Renderer(device, volume, options, [&stop] {
-      if (stop.stop_requested()) throw core::Error("the renderer is no longer wanted");
-    }));
+    made_ = core::guarded("making a renderer", [&] {
+      return Renderer(make_device_implementation(device, volume, options, [&stop] {
+        if (stop.stop_requested()) throw core::Error("the renderer is no longer wanted");
+      }));
+    });
   } catch (...) {
-    failure = std::current_exception();
+    failure_ = std::current_exception();
   }
-  done = true;
-  done.notify_all();
+  done_ = true;
+  done_.notify_all();
 }
 
 /// Waits for it.
-Renderer &QuickRenderer::Implementation::device_renderer() {
+Renderer &QuickImplementation::device_renderer() const {
   core::check_not_forked();
-  done.wait(false);
-  if (failure) std::rethrow_exception(failure);
-  return made.value();
+  done_.wait(false);
+  if (failure_) std::rethrow_exception(failure_);
+  return made_.value();
 }
 
-/// Null where the device's renderer is ready, or the host cannot draw the volume.
-HostRenderer *QuickRenderer::Implementation::host_renderer() {
-  if (done) {
-    host.reset();
+/// Null if the device's renderer is ready, or the host cannot draw the volume.
+Renderer *QuickImplementation::host_renderer() {
+  if (done_) {
+    host_.reset();
     return nullptr;
   }
-  if (!host && has_host) {
+  if (!host_ && has_host_) {
     try {
-      host.emplace(volume, host_options);
+      host_ = make_host_renderer(volume, host_options_);
     } catch (const Error &) {  // the limit; or a file, of which the device's renderer will tell
-      has_host = false;
+      has_host_ = false;
     }
   }
-  return host ? &*host : nullptr;
+  return host_ ? &*host_ : nullptr;
 }
 
-Frame QuickRenderer::Implementation::draw(const FrameRequest &request) {
-  if (done) {
-    host.reset();
-    return device_renderer().render(request);
-  }
-  HostRenderer *on_host = HostRenderer::can_draw(request) ? host_renderer() : nullptr;
+Renderer &QuickImplementation::any_renderer() {
+  Renderer *const on_host = host_renderer();
+  return on_host != nullptr ? *on_host : device_renderer();
+}
+
+Frame QuickImplementation::draw(const FrameRequest &request) {
+  Renderer *const on_host = host_can_draw(request) || done_ ? host_renderer() : nullptr;
   if (on_host == nullptr) return device_renderer().render(request);
   FrameRequest wanted = request;
   bool is_overtaken = false;
   wanted.on_pass = [&](const Progress &progress) {
-    is_overtaken = done;
+    is_overtaken = done_;
     return !is_overtaken && (!request.on_pass || request.on_pass(progress));
   };
   Frame frame = on_host->render(wanted);
   return is_overtaken ? draw(request) : frame;
 }
 
-QuickRenderer::QuickRenderer(std::shared_ptr<Device> device, std::shared_ptr<const Volume> volume,
+}  // namespace
+
+Renderer make_quick_renderer(std::shared_ptr<Device> device, std::shared_ptr<const Volume> volume,
                              const RendererOptions &options,
                              const HostRendererOptions &host_options) {
-  core::guarded("making a renderer", [&] {
+  return core::guarded("making a renderer", [&] {
     if (!device || !volume) throw core::Error("a renderer needs a device and a volume");
-    Renderer::check_options(*device, *volume, options);
-    implementation_ = std::make_unique<Implementation>(std::move(device), std::move(volume),
-                                                       options, host_options);
+    const core::ocl::Device &on = device->implementation().device;
+    const core::CompressedVolume &compressed = volume->implementation().volume;
+    core::make_plan(on, compressed,
+                    core::checked(core_options(options, volume->num_levels()), compressed, on));
+    return Renderer(
+        std::make_unique<QuickImplementation>(device, std::move(volume), options, host_options));
   });
-}
-
-/// In a forked process, the thread that makes the renderer is not there.
-QuickRenderer::~QuickRenderer() {
-  if (core::is_forked()) static_cast<void>(implementation_.release());
-}
-QuickRenderer::QuickRenderer(QuickRenderer &&) noexcept = default;
-QuickRenderer &QuickRenderer::operator=(QuickRenderer &&) noexcept = default;
-
-Frame QuickRenderer::render(const FrameRequest &request) {
-  const std::lock_guard lock(implementation_->mutex);
-  return implementation_->draw(request);
-}
-
-Frame QuickRenderer::cast_rays(std::span<const Ray> rays, double isovalue, Normals normals) {
-  const std::lock_guard lock(implementation_->mutex);
-  if (HostRenderer *on_host = implementation_->host_renderer())
-    return on_host->cast_rays(rays, isovalue, normals);
-  return implementation_->device_renderer().cast_rays(rays, isovalue, normals);
-}
-
-Camera QuickRenderer::camera(double isovalue, std::optional<ImageSize> size) {
-  const std::lock_guard lock(implementation_->mutex);
-  if (const HostRenderer *on_host = implementation_->host_renderer())
-    return on_host->camera(isovalue, size.value_or(implementation_->size));
-  return implementation_->device_renderer().camera(isovalue, size);
-}
-
-bool QuickRenderer::ready() const {
-  return implementation_->done;
-}
-
-void QuickRenderer::give_up() {
-  implementation_->maker.request_stop();
-}
-
-void QuickRenderer::wait() const {
-  implementation_->device_renderer();
-}
-
-std::uint64_t QuickRenderer::memory_bytes() const {
-  return implementation_->done && implementation_->made ? implementation_->made->memory_bytes() : 0;
 }
 
 }  // namespace isowave

@@ -1,23 +1,19 @@
 #include "isowave/renderer.hpp"
 
-#include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <mutex>
-#include <optional>
-#include <span>
 #include <utility>
 
+#include "core/accuracy/bounded_renderer.hpp"
 #include "core/accuracy/certify.hpp"
-#include "core/accuracy/choose_detail.hpp"
 #include "core/api/device_implementation.hpp"
 #include "core/api/frame_parts.hpp"
 #include "core/api/guarded.hpp"
+#include "core/api/renderer_implementation.hpp"
 #include "core/api/volume_implementation.hpp"
+#include "core/frame/timed_renderer.hpp"
 #include "core/io/file_name.hpp"
-#include "core/render/renderer.hpp"
-#include "core/render/renderer_options.hpp"
-#include "core/render/time_budget.hpp"
+#include "core/render/device_renderer.hpp"
 #include "core/zfp/isovalue.hpp"
 
 namespace isowave {
@@ -25,49 +21,6 @@ namespace isowave {
 namespace {
 
 using core::guarded;
-
-core::RendererOptions core_options(const RendererOptions &options, const Volume &volume) {
-  core::RendererOptions result;
-  result.size = core_size(options.largest);
-  result.memory_budget = options.memory_budget;
-  result.cache_slots = options.cache_blocks;
-  result.with_levels = options.with_levels && volume.num_levels() > 1;
-  result.with_bounds = options.with_bounds;
-  result.with_kept_picture = options.with_time_budget;
-  result.with_given_rays = options.with_rays;
-  return result;
-}
-
-}  // namespace
-
-struct Renderer::Implementation {
-  Implementation(std::shared_ptr<Device> device_used, std::shared_ptr<const Volume> volume_drawn,
-                 const RendererOptions &renderer_options)
-      : device(std::move(device_used)),
-        volume(std::move(volume_drawn)),
-        options(renderer_options),
-        renderer(device->implementation().device, volume->implementation().volume,
-                 core_options(options, *volume)) {
-    if (options.with_time_budget) timed.emplace(renderer);
-    note_memory();
-  }
-
-  /// For other threads, that may ask while a frame is drawn.
-  void note_memory() { memory_bytes = renderer.memory_plan().total(); }
-
-  Frame draw(const FrameRequest &request);
-  void draw_hits(const FrameRequest &request, core::FrameRequest &wanted, Frame &frame);
-  void fetch(const FrameRequest &request, const core::FrameRequest &drawn, Frame &frame);
-
-  std::shared_ptr<Device> device;
-  std::shared_ptr<const Volume> volume;
-  RendererOptions options;
-  core::Renderer renderer;
-  std::optional<core::TimedFrames> timed;
-  std::atomic<std::uint64_t> memory_bytes = 0;
-};
-
-namespace {
 
 /// The frame at work, for on_pass.
 class ProgressOf : public ProgressInTurns {
@@ -88,161 +41,210 @@ class ProgressOf : public ProgressInTurns {
   core::Appearance appearance_;
 };
 
-void check(const FrameRequest &request, const RendererOptions &options) {
-  if (request.max_surface_error && request.time_budget_ms)
-    throw core::Error("a frame cannot keep both an error and a time: give one of the two");
-  check_bounds(request, options);
-  if (request.time_budget_ms && !options.with_time_budget)
-    throw core::Error("a time budget needs a renderer that was made with_time_budget");
-  if (request.time_budget_ms && request.want_bounds)
-    throw core::Error("a picture within a time has no bounds of its error: leave out want_bounds");
-  if (request.ambient_rays != 0 && !options.with_rays)
-    throw core::Error("ambient rays need a renderer that was made with_rays");
-}
-
 }  // namespace
 
-/// Chooses the detail, or keeps to the time, where the request says so, and draws. wanted: becomes
-/// the request as it was drawn.
-void Renderer::Implementation::draw_hits(const FrameRequest &request, core::FrameRequest &wanted,
-                                         Frame &frame) {
-  ProgressOf progress(renderer, core_appearance(request.appearance));
-  const core::OnPass on_pass = [&](const core::PassStats &pass) {
-    return progress.show(pass, request.on_pass);
-  };
-  if (request.time_budget_ms) {
-    if (request.on_pass) wanted.on_pass = on_pass;
-    const core::TimedFrame drawn = timed.value().render(wanted, *request.time_budget_ms);
-    wanted.on_pass = {};
-    core::FrameStats stats = drawn.stats;
-    stats.cancelled = drawn.stopped;
-    describe_frame(request, stats, frame);
-    frame.statistics.complete = drawn.complete;
-    return;
-  }
-  if (request.max_surface_error) {
-    const core::DetailChoice choice = core::choose_detail(renderer, volume->implementation().volume,
-                                                          wanted, *request.max_surface_error);
-    wanted = core::with_detail(wanted, choice.detail);
-    frame.detail = public_choice(choice);
-  }
-  if (request.on_pass) wanted.on_pass = on_pass;
-  describe_frame(request, renderer.render(wanted), frame);
-  wanted.on_pass = {};
+core::RendererOptions core_options(const RendererOptions &options, std::uint32_t num_levels) {
+  core::RendererOptions result;
+  result.size = core_size(options.largest);
+  result.memory_budget = options.memory_budget;
+  result.cache_slots = options.cache_blocks;
+  result.with_levels = options.with_levels && num_levels > 1;
+  result.with_bounds = options.with_bounds;
+  result.with_kept_picture = options.with_time_budget;
+  result.with_given_rays = options.with_rays;
+  return result;
 }
 
-/// What the request wants of the frame that was drawn.
-void Renderer::Implementation::fetch(const FrameRequest &request, const core::FrameRequest &drawn,
-                                     Frame &frame) {
-  const core::CompressedVolume &compressed = volume->implementation().volume;
-  if (request.want_picture)
-    frame.picture = renderer.shade(core_appearance(request.appearance)).pixels;
-  if (!(request.want_depth || request.want_normals || request.want_positions || request.want_hits ||
-        request.want_bounds))
-    return;
-  const std::vector<core::HitRecord> records = renderer.hits();
-  fill_frame(request, records, compressed, renderer.options().with_levels, frame);
-  if (request.want_bounds)
-    frame.bounds = core::certify(renderer, compressed, drawn, records).bounds;
+std::unique_ptr<core::Renderer> with_choices(std::unique_ptr<core::Renderer> renderer,
+                                             const RendererOptions &options,
+                                             const core::CompressedVolume &volume, double rate) {
+  if (options.with_bounds)
+    renderer = std::make_unique<core::BoundedRenderer>(std::move(renderer), volume, rate);
+  if (options.with_time_budget)
+    renderer = std::make_unique<core::TimedRenderer>(std::move(renderer));
+  return renderer;
 }
 
-Frame Renderer::Implementation::draw(const FrameRequest &request) {
-  check(request, options);
-  core::FrameRequest wanted = core_request(request, volume->implementation().volume);
-  Frame frame;
-  draw_hits(request, wanted, frame);
-  frame.statistics.errors_are_stated = volume->errors_are_stated();
+CoreImplementation::CoreImplementation(std::shared_ptr<const void> keep,
+                                       const core::CompressedVolume &of, Turns &turns,
+                                       std::unique_ptr<core::Renderer> renderer)
+    : keep_(std::move(keep)), volume_(of), turns_(turns), renderer_(std::move(renderer)) {
   note_memory();
+}
+
+CoreImplementation::~CoreImplementation() {
+  const TurnOrMine turn(turns_);
+  renderer_.reset();
+}
+
+Frame CoreImplementation::render(const FrameRequest &request) {
+  return guarded("rendering", [&] {
+    const std::lock_guard lock(turns_);
+    return draw(request);
+  });
+}
+
+Frame CoreImplementation::draw(const FrameRequest &request) {
+  core::Team &team = renderer_->team();
+  if (team.size() > 1) core::agree_on(team, "request", text_of(request));
+  check_wanted(request, renderer_->abilities());
+  core::FrameRequest wanted = core_request(request, volume_);
+  ProgressOf progress(*renderer_, core_appearance(request.appearance));
+  if (request.on_pass) {
+    wanted.on_pass = [&](const core::PassStats &pass) {
+      return progress.show(pass, request.on_pass);
+    };
+  }
+  const core::FrameStats stats = renderer_->render(wanted);
+  Frame frame;
+  describe_frame(request, stats, frame);
+  frame.statistics.errors_are_stated = volume_.errors_are_stated;
+  note_memory();
+  wanted.on_pass = {};
+  if (stats.detail) {
+    wanted = core::with_detail(wanted, stats.detail->detail);
+    wanted.max_surface_error.reset();
+    if (team.rank() == 0) frame.detail = public_choice(*stats.detail);
+  }
   fetch(request, wanted, frame);
+  frame.statistics.hits = renderer_->num_hits(stats);
   return frame;
+}
+
+/// Gets what the request wants of the frame that was drawn.
+void CoreImplementation::fetch(const FrameRequest &request, const core::FrameRequest &drawn,
+                               Frame &frame) {
+  if (request.want_picture)
+    frame.picture = renderer_->shade(core_appearance(request.appearance)).pixels;
+  if (request.want_normals || request.want_positions || request.want_hits) {
+    fill_frame(request, renderer_->hits(), volume_, renderer_->abilities().levels, frame);
+  } else if (request.want_depth) {
+    frame.depth = renderer_->depth();
+  }
+  if (!request.want_bounds) return;
+  const std::vector<float> depth = request.want_depth ? frame.depth : renderer_->depth();
+  frame.bounds = core::certify(*renderer_, volume_, drawn, depth).bounds;
+}
+
+Frame CoreImplementation::cast_rays(std::span<const Ray> rays, double isovalue, Normals normals) {
+  return guarded("casting rays", [&] {
+    const std::lock_guard lock(turns_);
+    const std::vector<core::HitRecord> hits =
+        renderer_->cast_rays(world_rays(rays), core::drawn_isovalue(volume_, isovalue),
+                             static_cast<core::Normals>(normals));
+    note_memory();
+    return frame_of_rays(hits, volume_, renderer_->abilities().levels);
+  });
+}
+
+Camera CoreImplementation::camera(double isovalue, std::optional<ImageSize> size) {
+  return guarded("looking for the surface", [&] {
+    const std::lock_guard lock(turns_);
+    const float drawn = core::drawn_isovalue(volume_, isovalue);
+    return public_camera(
+        renderer_->camera({&drawn, 1}, size ? std::optional(core_size(*size)) : std::nullopt));
+  });
+}
+
+bool CoreImplementation::can_draw(const FrameRequest &request) const {
+  return isowave::can_draw(request, renderer_->abilities(), volume_);
+}
+
+std::string CoreImplementation::isovalue_notice(double isovalue) const {
+  return guarded("looking at an isovalue",
+                 [&] { return core::isovalue_notice(volume_, isovalue); });
+}
+
+std::unique_ptr<Renderer::Implementation> make_device_implementation(
+    std::shared_ptr<Device> device, std::shared_ptr<const Volume> volume,
+    const RendererOptions &options, const std::function<void()> &before_kernel) {
+  if (!device || !volume) throw core::Error("a renderer needs a device and a volume");
+  Device::Implementation &on = device->implementation();
+  const core::CompressedVolume &compressed = volume->implementation().volume;
+  const std::lock_guard lock(on.mutex);
+  const KernelWatch watch(on.device, before_kernel);
+  std::unique_ptr<core::Renderer> renderer =
+      with_choices(std::make_unique<core::DeviceRenderer>(
+                       on.device, compressed, core_options(options, volume->num_levels())),
+                   options, compressed, compressed.rate());
+  auto result = std::make_unique<CoreImplementation>(
+      std::make_shared<std::pair<std::shared_ptr<Device>, std::shared_ptr<const Volume>>>(device,
+                                                                                          volume),
+      compressed, on.mutex, std::move(renderer));
+  result->device_info = on.info;
+  result->grid = volume->grid();
+  result->notices = volume->notices();
+  result->device = std::move(device);
+  result->volume = std::move(volume);
+  return result;
 }
 
 Renderer::Renderer(std::shared_ptr<Device> device, std::shared_ptr<const Volume> volume,
                    const RendererOptions &options)
-    : Renderer(std::move(device), std::move(volume), options, {}) {}
+    : implementation_(guarded("making a renderer", [&] {
+        return make_device_implementation(std::move(device), std::move(volume), options);
+      })) {}
+Renderer::Renderer(std::unique_ptr<Implementation> implementation)
+    : implementation_(std::move(implementation)) {}
 
-Renderer::Renderer(std::shared_ptr<Device> device, std::shared_ptr<const Volume> volume,
-                   const RendererOptions &options, const std::function<void()> &before_kernel) {
-  guarded("making a renderer", [&] {
-    if (!device || !volume) throw core::Error("a renderer needs a device and a volume");
-    const std::lock_guard lock(device->implementation().mutex);
-    const KernelWatch watch(device->implementation().device, before_kernel);
-    implementation_ = std::make_unique<Implementation>(device, std::move(volume), options);
-  });
-}
-
-void Renderer::check_options(const Device &device, const Volume &volume,
-                             const RendererOptions &options) {
-  const core::ocl::Device &on = device.implementation().device;
-  const core::CompressedVolume &compressed = volume.implementation().volume;
-  core::make_plan(on, compressed, core::checked(core_options(options, volume), compressed, on));
-}
-
+/// In a forked process all is left as it is: a driver would wait for its threads.
 Renderer::~Renderer() {
-  release();
+  if (core::is_forked()) static_cast<void>(implementation_.release());
 }
 Renderer::Renderer(Renderer &&) noexcept = default;
 Renderer &Renderer::operator=(Renderer &&other) noexcept {
-  release();
+  const Renderer old(std::move(*this));
   implementation_ = std::move(other.implementation_);
   return *this;
 }
 
-/// Buffers go while no other thread drives the device, which must outlive the lock. In a forked
-/// process all is left as it is: a driver would wait for its threads.
-void Renderer::release() noexcept {
-  if (!implementation_) return;
-  if (core::is_forked()) {
-    static_cast<void>(implementation_.release());
-    return;
-  }
-  const std::shared_ptr<Device> device = implementation_->device;
-  const TurnOrMine turn(device->implementation().mutex);
-  implementation_.reset();
-}
-
 Frame Renderer::render(const FrameRequest &request) {
-  return guarded("rendering", [&] {
-    const std::lock_guard lock(implementation_->device->implementation().mutex);
-    return implementation_->draw(request);
-  });
+  return implementation_->render(request);
 }
-
 Frame Renderer::cast_rays(std::span<const Ray> rays, double isovalue, Normals normals) {
-  return guarded("casting rays", [&] {
-    if (!implementation_->options.with_rays)
-      throw core::Error("rays of any origin need a renderer that was made with_rays");
-    const std::lock_guard lock(implementation_->device->implementation().mutex);
-    core::Renderer &renderer = implementation_->renderer;
-    const core::CompressedVolume &compressed = volume()->implementation().volume;
-    const std::vector<core::HitRecord> hits =
-        renderer.cast_rays(world_rays(rays), core::drawn_isovalue(compressed, isovalue),
-                           static_cast<core::Normals>(normals));
-    implementation_->note_memory();
-    return frame_of_rays(hits, compressed, renderer.options().with_levels);
-  });
+  return implementation_->cast_rays(rays, isovalue, normals);
 }
-
 Camera Renderer::camera(double isovalue, std::optional<ImageSize> size) {
-  return guarded("looking for the surface", [&] {
-    const std::lock_guard lock(implementation_->device->implementation().mutex);
-    const float drawn = core::drawn_isovalue(volume()->implementation().volume, isovalue);
-    return public_camera(implementation_->renderer.camera(
-        {&drawn, 1}, size ? std::optional(core_size(*size)) : std::nullopt));
-  });
+  return implementation_->camera(isovalue, size);
 }
-
+bool Renderer::can_draw(const FrameRequest &request) const {
+  return implementation_->can_draw(request);
+}
+bool Renderer::ready() const {
+  return implementation_->ready();
+}
+bool Renderer::ready_for(const FrameRequest &request) const {
+  return implementation_->ready_for(request);
+}
+void Renderer::wait() const {
+  implementation_->wait();
+}
+void Renderer::give_up() {
+  implementation_->give_up();
+}
 const std::shared_ptr<Device> &Renderer::device() const {
   return implementation_->device;
 }
 const std::shared_ptr<const Volume> &Renderer::volume() const {
   return implementation_->volume;
 }
+const DeviceInfo &Renderer::device_info() const {
+  return implementation_->device_info;
+}
+const Grid &Renderer::grid() const {
+  return implementation_->grid;
+}
+const std::vector<std::string> &Renderer::notices() const {
+  return implementation_->notices;
+}
+std::string Renderer::isovalue_notice(double isovalue) const {
+  return implementation_->isovalue_notice(isovalue);
+}
 std::uint64_t Renderer::memory_bytes() const {
-  return implementation_->memory_bytes;
+  return implementation_->memory_bytes();
 }
 double Renderer::setup_ms() const {
-  return implementation_->renderer.setup_ms();
+  return implementation_->setup_ms();
 }
 
 namespace {

@@ -31,7 +31,7 @@ void field_words(std::span<const HitRecord> hits, HitField field, std::uint32_t 
 /// Gives hits [ray] the field that won.
 void set_field(std::span<const std::uint64_t> words, HitField field, std::span<HitRecord> hits);
 
-/// words [ray]: a brick's picture, of one ray a pixel, as Renderer::shade_packed() has it.
+/// words [ray]: a brick's picture, of one ray a pixel, as DeviceRenderer::shade_packed() has it.
 void color_words(std::span<const std::uint32_t> colors, std::uint32_t place,
                  std::span<std::uint64_t> words);
 /// Gives an RGB picture's pixels from `begin` on the colours that won.

@@ -9,7 +9,6 @@
 #include "core/base/ms_since.hpp"
 #include "core/base/parallel_for.hpp"
 #include "core/frame/ambient_rays.hpp"
-#include "core/frame/appearance.hpp"
 #include "core/frame/surface_camera.hpp"
 #include "core/platform/memory.hpp"
 #include "core/view/detail.hpp"
@@ -60,26 +59,22 @@ HostRenderer::HostRenderer(const CompressedVolume &volume, const HostRendererOpt
       num_threads_(options.num_threads),
       blocks_(volume, checked_limit(volume.info, options), options.num_threads) {}
 
-void HostRenderer::check(const FrameRequest &request) {
-  if (request.voxel_pixels != 0)
-    throw Error("levels of detail are drawn on devices alone: leave out voxel_pixels");
-  if (request.voxel_error != 0)
-    throw Error("voxels of fewer bit planes are drawn on devices alone: leave out voxel_error");
-  if (request.bound != FieldBound::kNone)
-    throw Error("bounds of the field are drawn on devices alone: leave out bound");
-  check_ambient_rays(request.ambient_rays);
+Abilities HostRenderer::all_abilities() {
+  Abilities abilities;
+  abilities.given_rays = true;
+  return abilities;
 }
 
 FrameStats HostRenderer::render(const FrameRequest &request) {
   const auto begin = std::chrono::steady_clock::now();
-  check(request);
-  const ImageSize size = request.size.value_or(ImageSize{});
+  check(request, abilities());
+  const ImageSize size = size_of(request, abilities());
   FrameParams frame = make_frame_params(info_, request.camera, size, request.isovalue);
   blocks_.select(request.isovalue);
   frame.surface = blocks_.surface();
   frame.screen = make_screen_box(frame);
   frame_ = frame;
-  samples_ = size.samples;
+  size_ = size;
   normals_ = request.normals;
   open_ = {};
   FrameStats stats;
@@ -90,6 +85,7 @@ FrameStats HostRenderer::render(const FrameRequest &request) {
     hits_.clear();
     throw;
   }
+  stats.complete = !stats.cancelled;
   stats.total_ms = ms_since(begin);
   return stats;
 }
@@ -157,7 +153,7 @@ void HostRenderer::add_ambient(const FrameRequest &request, FrameStats &stats) {
 template <class Draw, class After>
 bool HostRenderer::for_bands(const OnPass &on_pass, bool more_follows, Draw draw, After after) {
   const std::uint32_t width = frame_.view.width, rows = frame_.view.height,
-                      tile_rows = std::max(kTileRays / samples_, 1u) * samples_;
+                      tile_rows = std::max(kTileRays / size_.samples, 1u) * size_.samples;
   const std::uint32_t columns = rounded_up(width, kTileRays);
   const std::uint32_t band =
       on_pass ? tile_rows * rounded_up(kTilesPerThread * thread_count(num_threads_), columns)
@@ -198,19 +194,42 @@ std::vector<HitRecord> HostRenderer::cast_rays(std::span<const WorldRay> rays, f
   return hits;
 }
 
-Camera HostRenderer::camera(float isovalue, ImageSize size) const {
-  if (std::isnan(isovalue)) throw Error("the isovalue is NaN: give a number");
-  check_image_size(size);
-  return surface_camera(info_, blocks_.rounded_box(isovalue), size);
+Camera HostRenderer::camera(std::span<const float> isovalues, std::optional<ImageSize> size) {
+  const ImageSize of_picture = size.value_or(abilities().largest);
+  check_image_size(of_picture);
+  std::optional<BlockBox> box;
+  for (const float isovalue : isovalues) {
+    if (std::isnan(isovalue)) throw Error("the isovalue is NaN: give a number");
+    const std::optional<BlockBox> blocks = blocks_.rounded_box(isovalue);
+    if (!blocks) continue;
+    if (!box) box = blocks;
+    box->begin = glm::min(box->begin, blocks->begin);
+    box->end = glm::max(box->end, blocks->end);
+  }
+  return surface_camera(info_, box, of_picture);
 }
 
-Image8 HostRenderer::shade(const Appearance &appearance) const {
+void HostRenderer::check_has_picture() const {
   if (hits_.empty()) throw Error("there is no picture: no frame has been drawn");
+}
+
+std::vector<HitRecord> HostRenderer::hits() {
+  check_has_picture();
+  return hits_;
+}
+
+std::vector<float> HostRenderer::depth() {
+  check_has_picture();
+  return depth_of(hits_);
+}
+
+Image8 HostRenderer::shade(const Appearance &appearance) {
+  check_has_picture();
   const ShadeParams params = make_shade_params(info_, appearance);
-  Image8 image{frame_.view.width / samples_, frame_.view.height / samples_, 3, {}};
+  Image8 image{frame_.view.width / size_.samples, frame_.view.height / size_.samples, 3, {}};
   image.pixels.resize(std::size_t{3} * image.width * image.height);
   parallel_for(image.height, num_threads_, [&](std::uint64_t row, std::uint32_t) {
-    host_loops().shade(frame_, params, samples_, static_cast<uint>(row), hits_.data(),
+    host_loops().shade(frame_, params, size_.samples, static_cast<uint>(row), hits_.data(),
                        open_.counts.data(), open_.num_ambient,
                        image.pixels.data() + 3 * image.width * row);
   });

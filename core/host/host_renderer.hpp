@@ -7,13 +7,12 @@
 // to, which stay decoded for further frames.
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
-#include "core/frame/appearance.hpp"
-#include "core/frame/frame_request.hpp"
+#include "core/frame/renderer.hpp"
 #include "core/host/host_blocks.hpp"
-#include "core/view/given_rays.hpp"
 
 namespace isowave::core {
 
@@ -24,8 +23,7 @@ struct HostRendererOptions {
   std::uint32_t num_threads = 0;  ///< 0: one per processor
 };
 
-/// Not thread-safe.
-class HostRenderer {
+class HostRenderer : public Renderer {
  public:
   /// Reads all of the finest level, for its value ranges.
   ///
@@ -34,44 +32,34 @@ class HostRenderer {
   explicit HostRenderer(const CompressedVolume &volume, const HostRendererOptions &options = {});
   explicit HostRenderer(CompressedVolume &&, const HostRendererOptions & = {}) = delete;
 
-  /// Draws one frame: the hits that core::Renderer finds, bit for bit. on_pass is called after each
-  /// band of rows, from the top, by the calling thread.
+  static Abilities all_abilities();
+  Abilities abilities() const override { return all_abilities(); }
+  std::vector<VolumeInfo> levels() const override { return {info_}; }
+
+  /// Draws one frame. on_pass is called after each band of rows, from the top, by the calling
+  /// thread; rows that were not drawn have no hits.
   ///
-  /// request  without levels of detail, voxel_error and bound; a size
-  /// Throws   Error: others; what make_frame_params() throws; a file cannot be read: then there are
-  ///          no hits()
-  FrameStats render(const FrameRequest &request);
+  /// Throws  Error: a file cannot be read, too: then there are no hits()
+  FrameStats render(const FrameRequest &request) override;
+  std::vector<HitRecord> cast_rays(std::span<const WorldRay> rays, float isovalue,
+                                   Normals normals) override;
+  Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {}) override;
 
-  /// The first hit of each ray. t counts in lengths of its direction. Leaves the last frame as it
-  /// is.
-  ///
-  /// Throws  Error: the isovalue is NaN; a ray is not finite, has no direction, or begins more than
-  ///         1e7 voxels away from the volume's origin; a file cannot be read
-  std::vector<HitRecord> cast_rays(std::span<const WorldRay> rays, float isovalue, Normals normals);
-
-  /// Throws  Error: a request that render() refuses
-  static void check(const FrameRequest &request);
-
-  /// The view that core::Renderer::camera() takes of this isovalue, for a picture of that size.
-  ///
-  /// Throws  Error: NaN
-  Camera camera(float isovalue, ImageSize size) const;
-
-  /// The hits of the last frame [size.ray_rows()][size.ray_columns()], row 0 at the top; of rows
-  /// that were not drawn, none.
-  const std::vector<HitRecord> &hits() const { return hits_; }
-  /// How open they are.
+  ImageSize size() const override { return size_; }
+  std::vector<HitRecord> hits() override;
+  std::vector<float> depth() override;
+  /// How open the hits of the last frame are.
   const OpenCounts &open() const { return open_; }
-  /// The picture of hits(), RGB.
-  Image8 shade(const Appearance &appearance = {}) const;
+  Image8 shade(const Appearance &appearance = {}) override;
 
-  /// Forgets decoded blocks. Their memory is kept for others.
-  void clear_cache() { blocks_.forget(); }
+  /// The memory of decoded blocks is kept for others.
+  void clear_cache() override { blocks_.forget(); }
   std::uint64_t num_decoded_blocks() const { return blocks_.num_decoded(); }  ///< from the start
   /// At present: value ranges and decoded blocks. Pictures come on top.
-  std::uint64_t memory_bytes() const { return blocks_.bytes(); }
+  std::uint64_t memory_bytes() const override { return blocks_.bytes(); }
 
  private:
+  void check_has_picture() const;
   void draw_bands(const FrameRequest &request, FrameStats &stats);
   void add_ambient(const FrameRequest &request, FrameStats &stats);
   template <class Draw, class After>
@@ -81,7 +69,7 @@ class HostRenderer {
   std::uint32_t num_threads_;
   HostBlocks blocks_;
   FrameParams frame_{};
-  std::uint32_t samples_ = 1;
+  ImageSize size_;
   Normals normals_ = Normals::kSmooth;
   std::vector<HitRecord> hits_;
   OpenCounts open_;

@@ -92,8 +92,8 @@ class Device {
   MemoryLedger &ledger() { return ledger_; }
   StageTimer &timer() { return timer_; }
 
-  /// The program of one kernel file stem ("radix_sort" -> kernels_cl/radix_sort.cl), built once per
-  /// (stem, defines).
+  /// The program of one kernel file stem ("radix_sort" -> kernels_cl/paper/radix_sort.cl), built
+  /// once per (stem, defines).
   ///
   /// Throws  BuildError: it does not build
   const cl::Program &program(std::string_view stem, const Defines &defines = {});

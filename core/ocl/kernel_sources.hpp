@@ -23,8 +23,8 @@ std::span<const KernelFile> kernel_files();
 /// line that a reader can open. Throws std::invalid_argument where a header is missing.
 std::string join_kernel_file(std::span<const KernelFile> files, std::size_t i);
 
-/// The joined text of the kernel file of that stem: "radix_sort" for kernels_cl/radix_sort.cl.
-/// Throws std::invalid_argument where there is none.
+/// The joined text of the kernel file of that stem: "radix_sort" for
+/// kernels_cl/paper/radix_sort.cl. Throws std::invalid_argument where there is none.
 std::string kernel_text(std::string_view stem);
 
 }  // namespace isowave::core::ocl

@@ -62,7 +62,7 @@ BlockStore::BlockStore(ocl::Device &of, const CompressedVolume &volume,
   schedule_ = {.max_spec_count = options.max_speculation,
                .per_ray_speculation = options.per_ray_speculation,
                .table_groups = cache.table_groups,
-               .scanned_pairs = options.scanned_pairs};
+               .scanned_pairs = 0};
   level_frames->reserve(levels.size());  // they never move while they are written
 }
 

@@ -84,23 +84,21 @@ RendererLimits limits_of(const CompressedVolume &volume, const MemoryRequest &re
   const std::uint64_t rays = request.num_rays;
   const std::vector<FrameParams> grids = make_level_grids(level_infos(volume, request.with_levels));
   const FrameParams &last = grids.back();  // the others' ranges and masks lie before its
-  return {
+  RendererLimits limits{
       .macrocells = {.num_blocks = last.place.ranges_begin + block_count(last.grid),
                      .num_macrocells = last.place.masks_begin / 2 + num_macrocells(last.grid),
                      .num_selections = request.with_bounds ? kNumFieldBounds : 1,
                      .no_data_words = joined_no_data_words(levels_of(volume, request.with_levels))},
       .rays = {.num_rays = rays,
-               .with_pairs = request.pipeline == PipelineKind::kBlocks,
+               .with_pairs = false,
                .num_levels = grids.size(),
-               .with_given = request.with_given_rays,
-               .scanned_pairs = request.scanned_pairs},
+               .with_given = request.with_given_rays},
       .cache = BlockCache::limits_for(make_id_grid(grids), cache_slots, rays,
                                       request.sparse_table ? 4 : 2),
-      .pairs = {.num_rays = rays,
-                .num_slots = cache_slots,
-                .group_size = request.group_size,
-                .grouping = request.grouping},
+      .wave = {.num_rays = rays, .num_slots = cache_slots, .group_size = request.group_size},
       .kept_rays = request.kept_rays};
+  request.pipeline->add_to(limits.rays);
+  return limits;
 }
 
 const ocl::BufferSize &largest_of(const ocl::BufferSizes &buffers) {
@@ -151,11 +149,9 @@ std::uint32_t grown_cache_slots(const MemoryPlan &plan, std::uint64_t recycled) 
 }
 
 MemoryPlan resized(MemoryPlan plan, std::uint32_t cache_slots) {
-  plan.cache_slots = plan.limits.cache.num_slots = plan.limits.pairs.num_slots = cache_slots;
-  const PipelineKind pipeline =
-      plan.limits.rays.with_pairs ? PipelineKind::kBlocks : PipelineKind::kRays;
+  plan.cache_slots = plan.limits.cache.num_slots = plan.limits.wave.num_slots = cache_slots;
   plan.buffers.resize(BlockCache::sizes(plan.limits.cache));
-  plan.buffers.resize(pipeline_sizes(pipeline, plan.limits.pairs));
+  plan.buffers.resize(plan.pipeline->sizes(plan.limits.wave));
   plan.buffers.resize(ZfpDecode::sizes(plan.limits.cache.max_requests(), true, true));
   return plan;
 }
@@ -163,6 +159,7 @@ MemoryPlan resized(MemoryPlan plan, std::uint32_t cache_slots) {
 MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &request,
                        std::uint32_t cache_slots) {
   MemoryPlan plan;
+  plan.pipeline = request.pipeline;
   plan.limits = limits_of(volume, request, cache_slots);
   plan.cache_slots = plan.most_slots = cache_slots;
   plan.stream = request.stream == StreamPlace::kHost ? StreamPlace::kHost : StreamPlace::kDevice;
@@ -177,7 +174,7 @@ MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &requ
                                       plan.stream == StreamPlace::kHost, levels.size() > 1));
   plan.buffers.add(Wavefront::sizes(limits.rays))
       .add(BlockCache::sizes(limits.cache))
-      .add(pipeline_sizes(request.pipeline, limits.pairs, request.scanned_pairs))
+      .add(plan.pipeline->sizes(limits.wave))
       .add(Shade::sizes(request.num_rays))
       .add(PassReadback::sizes());
   if (request.with_given_rays) plan.buffers.add(Ambient::sizes());

@@ -30,8 +30,7 @@ StreamPlace stream_place_from_string(std::string_view name);
 /// What the memory of a renderer depends on, besides its volume.
 struct MemoryRequest {
   std::uint64_t num_rays = 0;
-  PipelineKind pipeline = PipelineKind::kRays;  ///< kBlocks or kRays
-  Grouping grouping = kDefaultGrouping;
+  PipelinePtr pipeline = rays_pipeline();
   std::uint32_t group_size = 64;
   StreamPlace stream = StreamPlace::kAuto;
   std::uint64_t largest_stream_part =
@@ -41,7 +40,6 @@ struct MemoryRequest {
   bool with_bounds = false;         ///< and the bounds of their blocks' errors
   std::uint64_t kept_rays = 0;      ///< of KeptPicture
   bool with_given_rays = false;     ///< rays of any origin, and ambient rays
-  bool scanned_pairs = false;       ///< of pipeline kBlocks
   bool sparse_table = false;        ///< the cache's, which rays look up in faster
 };
 
@@ -51,11 +49,12 @@ struct RendererLimits {
   MacrocellBuffers::Limits macrocells{};
   Wavefront::Limits rays{};
   BlockCache::Limits cache{};
-  Group::Limits pairs{};
+  WaveLimits wave{};            ///< of camera rays
   std::uint64_t kept_rays = 0;  ///< of KeptPicture; 0: there is none
 };
 
 struct MemoryPlan {
+  PipelinePtr pipeline;
   RendererLimits limits{};
   ocl::BufferSizes buffers;  ///< that live as long as the renderer
   std::uint64_t setup_bytes =

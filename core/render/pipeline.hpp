@@ -1,23 +1,21 @@
 #pragma once
-// The two pipelines: ways to arrange the stages of a pass of camera rays, with the same finished
-// picture bit for bit.
+// Pipelines: ways to trace the camera's rays, with the same finished picture bit for bit.
 //
 //   rays    each ray intersects what it meets, as far as it is cached (core/render/ray_waves.hpp)
-//   blocks  the paper's (core/render/blocks_wave.hpp)
+//   blocks  the paper's, to compare with (core/paper/blocks_pipeline.hpp)
 
 #include <cstdint>
+#include <memory>
 #include <string_view>
 
-#include "core/stages/group.hpp"
+#include "core/ocl/buffer_sizes.hpp"
+#include "core/stages/wavefront.hpp"
 
 namespace isowave::core {
 
-enum class PipelineKind {
-  kAuto,  ///< kRays, which was faster in nearly all that was measured (bench/README.md)
-  kBlocks,
-  kRays
-};
-std::string_view to_string(PipelineKind kind);
+class BlockStore;
+class Wave;
+struct RendererOptions;
 
 /// Packets of eight rays; where they cannot be had (MarchPackets), there are none.
 enum class RayPackets { kAuto, kOn, kOff };
@@ -26,10 +24,32 @@ enum class RayPackets { kAuto, kOn, kOff };
 /// where the stream stays on the host.
 enum class DecodeOnDemand { kAuto, kOn, kOff };
 
-/// The buffers of a pipeline beside those of BlockStore and Wavefront.
-///
-/// scanned_pairs: as Wavefront::Limits has it.
-ocl::BufferSizes pipeline_sizes(PipelineKind kind, const Group::Limits &limits,
-                                bool scanned_pairs = false);
+/// What the lengths of a wave's buffers depend on.
+struct WaveLimits {
+  std::uint64_t num_rays = 0;
+  std::uint32_t num_slots = 0;  ///< of the cache
+  std::uint32_t group_size = 64;
+};
+
+class Pipeline {
+ public:
+  virtual ~Pipeline() = default;
+
+  virtual std::string_view name() const = 0;
+  /// Whether it draws several levels of detail.
+  virtual bool has_levels() const = 0;
+  /// Adds what its rays need of a Wavefront.
+  virtual void add_to(Wavefront::Limits &limits) const = 0;
+  /// The buffers of its wave beside those of BlockStore and Wavefront.
+  virtual ocl::BufferSizes sizes(const WaveLimits &limits) const = 0;
+  /// The wave of camera rays. blocks, rays: must outlive it.
+  virtual std::unique_ptr<Wave> make_wave(BlockStore &blocks, Wavefront &rays,
+                                          const WaveLimits &limits,
+                                          const RendererOptions &options) const = 0;
+};
+using PipelinePtr = std::shared_ptr<const Pipeline>;
+
+/// The default: it was faster in nearly all that was measured (bench/README.md).
+PipelinePtr rays_pipeline();
 
 }  // namespace isowave::core

@@ -69,4 +69,26 @@ void AmbientRound::begin() {
   given_.begin();
 }
 
+namespace {
+
+class RaysPipeline : public Pipeline {
+ public:
+  std::string_view name() const override { return "rays"; }
+  bool has_levels() const override { return true; }
+  void add_to(Wavefront::Limits & /*limits*/) const override {}
+  ocl::BufferSizes sizes(const WaveLimits & /*limits*/) const override { return {}; }
+  std::unique_ptr<Wave> make_wave(BlockStore &blocks, Wavefront &rays, const WaveLimits &limits,
+                                  const RendererOptions &options) const override {
+    return std::make_unique<RaysWave>(blocks, rays, limits.group_size, options.solver,
+                                      RaySource::kCamera, options.packets, options.on_demand);
+  }
+};
+
+}  // namespace
+
+PipelinePtr rays_pipeline() {
+  static const auto pipeline = std::make_shared<const RaysPipeline>();
+  return pipeline;
+}
+
 }  // namespace isowave::core

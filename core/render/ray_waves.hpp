@@ -33,6 +33,10 @@ class RaysWave : public Wave {
 
   void begin() override;
   void enqueue_pass() override;
+  /// Rays look ahead at the end of a pass: those that are left.
+  void describe(PassStats &stats) const override {
+    set_n_spec(stats, stats.counts.next_active_count);
+  }
 
  private:
   const Macrocells &macrocells() const { return blocks_.levels[0].macrocells; }

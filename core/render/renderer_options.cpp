@@ -14,9 +14,10 @@ RendererOptions checked(RendererOptions options, const CompressedVolume &volume,
   check_volume_info(volume.info, "the volume");
   check_image_size(options.size);
   if (options.with_levels) check_has_levels(volume);
-  if (options.with_levels && options.pipeline == PipelineKind::kBlocks)
+  if (options.with_levels && !options.pipeline->has_levels())
     throw Error(
-        "pipeline blocks draws one level of detail: leave it to pipeline rays, or allow 0 pixels");
+        "pipeline {} draws one level of detail: leave it to pipeline rays, or allow 0 pixels",
+        options.pipeline->name());
   const std::uint64_t layer_ids = std::uint64_t{volume.num_blocks().x} * volume.num_blocks().y;
   std::uint64_t num_ids = 0;  // see make_id_grid()
   for (const CompressedVolume *level : levels_of(volume, options.with_levels))
@@ -29,10 +30,6 @@ RendererOptions checked(RendererOptions options, const CompressedVolume &volume,
     throw Error("a speculation limit of {} is out of range: 1 to {}", options.max_speculation,
                 ISO_MAX_SPECULATION);
   }
-  if (options.pipeline == PipelineKind::kAuto) options.pipeline = PipelineKind::kRays;
-  if (options.scanned_pairs && options.pipeline != PipelineKind::kBlocks)
-    throw Error("scanned speculation is pipeline blocks's: leave it out, or give that pipeline");
-  if (options.scanned_pairs) options.per_ray_speculation = false;
   if (!std::has_single_bit(options.group_size) || options.group_size < 8 ||
       options.group_size > 256) {
     throw Error("a work-group size of {} cannot be used: a power of two from 8 to 256 can",
@@ -56,7 +53,6 @@ MemoryPlan make_plan(const ocl::Device &device, const CompressedVolume &volume,
                      const RendererOptions &options) {
   const MemoryRequest request{options.size.num_rays(),
                               options.pipeline,
-                              options.grouping,
                               options.group_size,
                               options.stream,
                               options.largest_stream_part,
@@ -65,7 +61,6 @@ MemoryPlan make_plan(const ocl::Device &device, const CompressedVolume &volume,
                               options.with_bounds,
                               options.with_kept_picture ? halved(options.size, 1).num_rays() : 0,
                               options.with_given_rays,
-                              options.scanned_pairs,
                               options.memory_budget == 0 && options.cache_slots == 0};
   const std::uint64_t budget = options.memory_budget != 0
                                    ? options.memory_budget

@@ -12,7 +12,7 @@ namespace isowave::core {
 /// Frames ask for the rest (FrameRequest).
 struct RendererOptions {
   ImageSize size{};  ///< the largest picture: frames may have as many rays, in any shape
-  PipelineKind pipeline = PipelineKind::kAuto;
+  PipelinePtr pipeline = rays_pipeline();
   std::uint64_t memory_budget = 0;  ///< bound on all device memory [bytes]; 0: 3/4 of the device's
   /// Decoded blocks kept, at least 8. 0: as many as the budget allows; without one, as many as
   /// frames need: the cache grows, up to kAmpleCacheSlots (MemoryPlan::most_slots).
@@ -22,19 +22,12 @@ struct RendererOptions {
   std::uint32_t max_speculation =
       64;  ///< blocks a ray looks ahead at most, 1..64; 1 turns speculation off
   bool per_ray_speculation = true;  ///< each ray by what it has missed, not all alike
-  /// Pipeline `blocks`: all rays alike, but what rays with few blocks before them leave goes to the
-  /// others (kernels_cl/traverse.cl).
-  bool scanned_pairs = false;
-  Solver solver = kDefaultSolver;  ///< root finder in a cell
+  Solver solver = kDefaultSolver;   ///< root finder in a cell
   /// Whether rays march in packets of eight (pipeline `rays`); kAuto: where MarchPackets suits.
   RayPackets packets = RayPackets::kAuto;
   /// Whether packets decode the blocks that they come to; kAuto: where MarchPackets may.
   DecodeOnDemand on_demand = DecodeOnDemand::kAuto;
-  std::uint32_t group_size = 64;  ///< work-items per work-group, a power of two in 8..256
-  /// How a pass's pairs are gathered by block.
-  Grouping grouping = kDefaultGrouping;
-  ClosestHit closest =
-      kDefaultClosestHit;  ///< how a ray's closest result is found (pipeline `blocks`)
+  std::uint32_t group_size = 64;            ///< work-items per work-group, a power of two in 8..256
   StreamPlace stream = StreamPlace::kAuto;  ///< where the compressed volume is
   /// Bytes of one of its at most four buffers; 0: what the device allows.
   std::uint64_t largest_stream_part = 0;
@@ -43,7 +36,7 @@ struct RendererOptions {
   std::uint32_t window_blocks = 0;
   bool with_levels = false;        ///< frames may use the volume's levels of detail
   bool with_bounds = false;        ///< frames may draw bounds of the volume
-  bool with_kept_picture = false;  ///< Renderer::keep_picture() will be called
+  bool with_kept_picture = false;  ///< DeviceRenderer::keep_picture() will be called
   bool with_given_rays = false;    ///< frames may have ambient rays, and rays may be cast
   /// Frames are drawn for pictures: else the kernels of smooth normals and of shade() are built
   /// when they are needed.

@@ -5,8 +5,15 @@
 #include <cstdint>
 
 #include "core/frame/frame_request.hpp"
+#include "kernels_cl/portable/window.h"
 
 namespace isowave::core {
+
+/// The mean number of blocks that so many rays of a pass were to look ahead at.
+inline void set_n_spec(PassStats &stats, uint rays_looking) {
+  const uint rays = rays_in_window(stats.counts.window_count, rays_looking);
+  if (rays != 0) stats.n_spec = static_cast<double>(stats.counts.ahead_count) / rays;
+}
 
 class Wave {
  public:
@@ -23,6 +30,8 @@ class Wave {
   virtual void enqueue_pass() = 0;
   /// Sum of the wave's passes in the statistics; none: FrameStats::passes lists each.
   virtual LaterPasses *sum_in(FrameStats & /*stats*/) const { return nullptr; }
+  /// Adds to a pass's statistics what depends on how a wave of camera rays is traced.
+  virtual void describe(PassStats & /*stats*/) const {}
   /// For a cache of so many slots from now on: as BlockCache::resize(). Between frames.
   virtual void resize_cache(std::uint32_t /*num_slots*/) {}
 };

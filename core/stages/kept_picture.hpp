@@ -10,14 +10,6 @@
 
 namespace isowave::core {
 
-/// A picture of half the rays, so many times, along each axis, rounded up: one for each pixel. 0
-/// times: the picture itself.
-inline ImageSize halved(ImageSize size, unsigned times) {
-  if (times == 0) return size;
-  const auto half = [times](std::uint32_t rays) { return ((rays - 1) >> times) + 1; };
-  return {half(size.ray_columns()), half(size.ray_rows())};
-}
-
 class KeptPicture {
  public:
   /// num_rays: of the largest picture that can be kept.

@@ -2,31 +2,12 @@
 // The rays of a frame on the device and the arrays of one pass. R = rays; nothing here grows with
 // the volume.
 
-#include <string_view>
 #include <utility>
 
 #include "core/stages/device_counts.hpp"
 #include "core/view/frame.hpp"
 
 namespace isowave::core {
-
-/// How the closest of a ray's results is found (pipeline `blocks`). The picture has the same bits
-/// either way.
-enum class ClosestHit {
-  kScan,      ///< composite looks at each of them
-  kAtomicMin  ///< whoever has a result offers its index: one word a ray to look at
-};
-inline constexpr ClosestHit kDefaultClosestHit = ClosestHit::kAtomicMin;
-
-/// "scan", "atomic-min".
-std::string_view to_string(ClosestHit closest);
-/// Throws  Error naming both
-ClosestHit closest_hit_from_string(std::string_view name);
-
-/// The macro for the kernels that take part.
-inline ocl::Defines closest_defines(ClosestHit closest) {
-  return {{"ISO_CLOSEST_BY_ATOMICS", closest == ClosestHit::kAtomicMin ? "1" : "0"}};
-}
 
 /// Where the rays of pipeline `rays` come from.
 enum class RaySource {

@@ -27,6 +27,14 @@ struct ImageSize {
 /// Throws  Error: an image of 0 pixels, more than 2^28 rays, samples out of range
 void check_image_size(ImageSize size);
 
+/// A picture of half the rays, so many times, along each axis, rounded up: one for each pixel. 0
+/// times: the picture itself.
+inline ImageSize halved(ImageSize size, unsigned times) {
+  if (times == 0) return size;
+  const auto half = [times](std::uint32_t rays) { return ((rays - 1) >> times) + 1; };
+  return {half(size.ray_columns()), half(size.ray_rows())};
+}
+
 /// Blocks along an axis of `dim` voxels that own dual cells: all but a last one of a single voxel
 /// layer.
 inline std::uint32_t num_owning_blocks(std::uint32_t dim) {

@@ -40,6 +40,7 @@
 #include "core/base/text.hpp"
 #include "core/io/file_name.hpp"
 #include "core/io/input_file.hpp"
+#include "core/paper/blocks_pipeline.hpp"
 #include "core/platform/names_in.hpp"
 #include "tools/isowave/bench_paper_runs.hpp"
 #include "tools/isowave/frame_options.hpp"
@@ -197,10 +198,10 @@ ordered_json measure_volume(const ocl::DeviceInfo &device, const BenchPaperArgs 
     methods.push_back(std::move(row));
   };
   double most_active = 0;  // blocks of a cold frame
-  for (const PipelineKind pipeline : {PipelineKind::kBlocks, PipelineKind::kRays}) {
+  for (const PipelinePtr &pipeline : {blocks_pipeline(), rays_pipeline()}) {
     for (const LookAhead look_ahead : {LookAhead::kDefault, LookAhead::kOff}) {
       add(measure_rays(device, run, {pipeline, look_ahead}, parts));
-      if (pipeline != PipelineKind::kRays || look_ahead == LookAhead::kOff) continue;
+      if (blocks_options(*pipeline) != nullptr || look_ahead == LookAhead::kOff) continue;
       most_active = methods.back().at("active_blocks").at("max").get<double>();
     }
   }
@@ -213,14 +214,14 @@ ordered_json measure_volume(const ocl::DeviceInfo &device, const BenchPaperArgs 
                    parts));
   for (const std::string &size : options.scaling) {
     part.size = parse_size(size);
-    for (const PipelineKind pipeline : {PipelineKind::kBlocks, PipelineKind::kRays})
+    for (const PipelinePtr &pipeline : {blocks_pipeline(), rays_pipeline()})
       add(measure_rays(device, part, {pipeline}, parts));
     add(measure_bcmc(device, part, 0, parts));
   }
-  const RayMethod scanned{PipelineKind::kBlocks, LookAhead::kScanned};
+  const RayMethod scanned{blocks_pipeline(), LookAhead::kScanned};
   add(measure_rays(device, run, scanned, parts));
   ordered_json limits = ordered_json::array();
-  for (const RayMethod &method : {RayMethod{PipelineKind::kBlocks}, scanned, RayMethod{}})
+  for (const RayMethod &method : {RayMethod{blocks_pipeline()}, scanned, RayMethod{}})
     limits.push_back(measure_limits(device, few, method, options.limits));
   std::string pictures;
   if (!options.pictures.empty())

@@ -7,7 +7,8 @@
 
 #include "core/base/error.hpp"
 #include "core/base/ms_since.hpp"
-#include "core/extract/mesh_renderer.hpp"
+#include "core/paper/blocks_pipeline.hpp"
+#include "core/paper/mesh_renderer.hpp"
 
 namespace isowave::core::tools {
 
@@ -116,8 +117,9 @@ RendererOptions options_of(const PaperRun &run, const RayMethod &method) {
   RendererOptions options{.size = run.size, .pipeline = method.pipeline};
   if (method.look_ahead == LookAhead::kOff) options.max_speculation = 1;
   options.per_ray_speculation =
-      method.pipeline == PipelineKind::kRays && method.look_ahead != LookAhead::kOff;
-  options.scanned_pairs = method.look_ahead == LookAhead::kScanned;
+      blocks_options(*method.pipeline) == nullptr && method.look_ahead != LookAhead::kOff;
+  if (method.look_ahead == LookAhead::kScanned)
+    options.pipeline = blocks_pipeline({.scanned_pairs = true});
   options.cache_slots = method.cache_slots;
   options.with_shading = false;
   return options;
@@ -126,12 +128,12 @@ RendererOptions options_of(const PaperRun &run, const RayMethod &method) {
 const char *name_of(const RayMethod &method) {
   if (method.look_ahead == LookAhead::kOff) return "off";
   if (method.look_ahead == LookAhead::kScanned) return "scanned";
-  return method.pipeline == PipelineKind::kRays ? "per-ray" : "global";
+  return blocks_options(*method.pipeline) == nullptr ? "per-ray" : "global";
 }
 
 /// Milliseconds and completed rays after each pass, of first views from an empty cache. touched:
 /// gets the blocks that each of these passes looked at.
-ordered_json measure_progress(Renderer &renderer, const PaperRun &run, std::size_t count,
+ordered_json measure_progress(DeviceRenderer &renderer, const PaperRun &run, std::size_t count,
                               std::vector<double> &touched) {
   ByPass ms(0), completed(100);
   std::vector<std::vector<double>> times;
@@ -164,7 +166,7 @@ ordered_json measure_progress(Renderer &renderer, const PaperRun &run, std::size
 ordered_json measure_rays(const ocl::DeviceInfo &device_info, const PaperRun &run,
                           const RayMethod &method, const PaperParts &parts) {
   ocl::Device device(device_info);
-  Renderer renderer(device, run.volume, options_of(run, method));
+  DeviceRenderer renderer(device, run.volume, options_of(run, method));
   renderer.render(request_of(run, 0, 0));  // the first frame of all does more
   renderer.clear_cache();
   RayTally tally;
@@ -185,7 +187,7 @@ ordered_json measure_rays(const ocl::DeviceInfo &device_info, const PaperRun &ru
   const ordered_json progress = measure_progress(
       renderer, run, std::min<std::size_t>(parts.progress, run.isovalues.size()), touched);
   ordered_json json = {
-      {"method", to_string(method.pipeline)},
+      {"method", method.pipeline->name()},
       {"speculation", method.look_ahead != LookAhead::kOff},
       {"look_ahead", name_of(method)},
       {"cache", method.cache_slots == 0 ? "default" : "one frame"},
@@ -223,7 +225,7 @@ ordered_json measure_limits(const ocl::DeviceInfo &device_info, const PaperRun &
     RendererOptions options = options_of(run, method);
     options.max_speculation = limit;
     options.on_demand = DecodeOnDemand::kOff;  // on PoCL, rays would have nothing to look ahead for
-    Renderer renderer(device, run.volume, options);
+    DeviceRenderer renderer(device, run.volume, options);
     renderer.render(request_of(run, 0, 0));
     std::vector<double> ms, passes, decoded;
     each_frame(run, [&](std::size_t i, std::size_t view) {
@@ -238,7 +240,7 @@ ordered_json measure_limits(const ocl::DeviceInfo &device_info, const PaperRun &
                         {"passes", summary(passes)},
                         {"active_blocks", summary(decoded)}});
   }
-  return {{"method", to_string(method.pipeline)},
+  return {{"method", method.pipeline->name()},
           {"look_ahead", name_of(method)},
           {"size", {run.size.width, run.size.height}},
           {"by_limit", by_limit}};
@@ -311,7 +313,7 @@ ordered_json compare_methods(const ocl::DeviceInfo &device_info, const PaperRun 
   std::vector<HitRecord> of_rays, of_mesh;
   {
     ocl::Device device(device_info);
-    Renderer renderer(device, run.volume, options_of(run, {}));
+    DeviceRenderer renderer(device, run.volume, options_of(run, {}));
     renderer.render(request_of(run, 0, 0));
     of_rays = renderer.hits();
     if (!pictures.empty()) write_png(renderer.shade(), pictures + "_rays.png");

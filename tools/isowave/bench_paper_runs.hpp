@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "core/render/renderer.hpp"
+#include "core/render/device_renderer.hpp"
 #include "core/view/camera.hpp"
 
 namespace isowave::core::tools {
@@ -36,7 +36,7 @@ enum class LookAhead {
 
 /// One way to draw with rays.
 struct RayMethod {
-  PipelineKind pipeline = PipelineKind::kRays;
+  PipelinePtr pipeline = rays_pipeline();
   LookAhead look_ahead = LookAhead::kDefault;
   std::uint32_t cache_slots = 0;  ///< 0: the renderer's default
 };

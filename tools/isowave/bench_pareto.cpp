@@ -20,7 +20,7 @@
 #include "core/base/parallel_for.hpp"
 #include "core/io/file_name.hpp"
 #include "core/io/open_volume.hpp"
-#include "core/render/renderer.hpp"
+#include "core/render/device_renderer.hpp"
 #include "reference/accuracy.hpp"
 #include "tools/isowave/frame_options.hpp"
 #include "tools/isowave/outputs.hpp"
@@ -79,7 +79,7 @@ struct View {
   std::vector<HitRecord> hits;
 };
 
-View view_of(Renderer &renderer) {
+View view_of(DeviceRenderer &renderer) {
   View view;
   view.hits = renderer.hits();
   view.picture = renderer.shade();
@@ -183,13 +183,14 @@ bool has_levels(const Point &point) {
   return point.max_surface_error || point.details.front().voxel_pixels > 0;
 }
 
-Renderer make_renderer(ocl::Device &device, const ParetoSubject &subject, const Point &point) {
+DeviceRenderer make_renderer(ocl::Device &device, const ParetoSubject &subject,
+                             const Point &point) {
   RendererFlags flags{.pipeline = point.pipeline, .solver = point.solver, .values = {}};
   if (!point.max_surface_error) flags.voxel_pixels = point.details.front().voxel_pixels;
   const RendererOptions options = to_renderer_options(flags, subject.size);
   const CompressedVolume &volume = point.stored->volume;
-  return Renderer(device, volume,
-                  point.max_surface_error ? with_choices(options, volume) : options);
+  return DeviceRenderer(device, volume,
+                        point.max_surface_error ? with_choices(options, volume) : options);
 }
 
 FrameRequest request_of(const ParetoSubject &subject, const Point &point, std::size_t view) {
@@ -200,19 +201,19 @@ FrameRequest request_of(const ParetoSubject &subject, const Point &point, std::s
 }
 
 /// Draws one view of the point once: the first frame of an isovalue, or of a precision, does more.
-void warm_up(Renderer &renderer, const ParetoSubject &subject, const Point &point,
+void warm_up(DeviceRenderer &renderer, const ParetoSubject &subject, const Point &point,
              std::size_t view) {
   renderer.render(request_of(subject, point, view));
 }
 
-FrameStats draw_cold(Renderer &renderer, const ParetoSubject &subject, const Point &point,
+FrameStats draw_cold(DeviceRenderer &renderer, const ParetoSubject &subject, const Point &point,
                      std::size_t view) {
   renderer.clear_cache();
   return renderer.render(request_of(subject, point, view));
 }
 
 /// Draws every view `rounds` times from an empty cache.
-void measure(Renderer &renderer, const ParetoSubject &subject, Point &point) {
+void measure(DeviceRenderer &renderer, const ParetoSubject &subject, Point &point) {
   std::vector<double> times;
   std::uint64_t decoded = 0;
   std::vector<View> views;
@@ -238,8 +239,8 @@ void measure(Renderer &renderer, const ParetoSubject &subject, Point &point) {
 /// How many times as long as the other one takes: the median of cold frames drawn in turn.
 double time_ratio(ocl::Device &device, const ParetoSubject &subject, const Point &point,
                   const Point &other) {
-  Renderer renderer = make_renderer(device, subject, point),
-           others = make_renderer(device, subject, other);
+  DeviceRenderer renderer = make_renderer(device, subject, point),
+                 others = make_renderer(device, subject, other);
   std::vector<double> ratios;
   for (std::size_t view = 0; view < subject.cameras.size(); ++view) {
     warm_up(renderer, subject, point, view);
@@ -273,7 +274,7 @@ ParetoSubject make_subject(ocl::Device &device, const BenchParetoArgs &options) 
   subject.cameras = orbit_cameras(info, options.views);
   subject.voxel = std::max({info.spacing.x, info.spacing.y, info.spacing.z});
   subject.value_range = double{finest.value_range[1]} - double{finest.value_range[0]};
-  Renderer renderer(device, finest, {.size = subject.size});
+  DeviceRenderer renderer(device, finest, {.size = subject.size});
   for (const Camera &camera : subject.cameras) {
     renderer.render({.camera = camera, .isovalue = options.isovalue, .normals = Normals::kCell});
     subject.truth.emplace_back(view_of(renderer));
@@ -367,7 +368,7 @@ void sweep(ocl::Device &device, const ParetoSubject &subject, const BenchParetoA
         point.pipeline = pipeline;
         point.solver = solver;
         point.details.resize(subject.cameras.size(), Detail{.voxel_pixels = voxel_pixels});
-        Renderer renderer = make_renderer(device, subject, point);
+        DeviceRenderer renderer = make_renderer(device, subject, point);
         for (const double voxel_error : options.voxel_errors) {
           for (Detail &detail : point.details)
             detail.voxel_error = voxel_error * subject.value_range;
@@ -387,7 +388,7 @@ void choose(ocl::Device &device, const ParetoSubject &subject, const BenchPareto
   Point any;
   any.stored = &stored;
   any.max_surface_error = options.max_surface_errors.front();
-  Renderer renderer = make_renderer(device, subject, any);
+  DeviceRenderer renderer = make_renderer(device, subject, any);
   for (const double max_surface_error : options.max_surface_errors) {
     Point point = any;
     point.max_surface_error = max_surface_error;

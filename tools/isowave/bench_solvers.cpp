@@ -18,7 +18,7 @@
 #include "core/base/parallel_for.hpp"
 #include "core/io/file_name.hpp"
 #include "core/io/png.hpp"
-#include "core/render/renderer.hpp"
+#include "core/render/device_renderer.hpp"
 #include "core/stages/solve_cells.hpp"
 #include "reference/accuracy.hpp"
 #include "reference/root_oracle.hpp"
@@ -300,7 +300,7 @@ Image8 failure_picture(const Image8 &shaded, const std::vector<Verdict> &verdict
 }
 
 void write_failure_picture(const BenchSolversArgs &options, const Subject &subject,
-                           const HitOracle &oracle, Solver solver, Renderer &renderer) {
+                           const HitOracle &oracle, Solver solver, DeviceRenderer &renderer) {
   const std::vector<HitRecord> hits = renderer.hits();
   std::vector<Verdict> verdicts(hits.size());
   parallel_for(hits.size(), 0, [&](std::uint64_t pixel, std::uint32_t) {
@@ -318,7 +318,7 @@ ordered_json bench_frames(ocl::Device &device, const Subject &subject,
   const FrameOracle oracle(subject);
   struct Run {
     Solver solver;
-    std::unique_ptr<Renderer> renderer;
+    std::unique_ptr<DeviceRenderer> renderer;
     std::vector<double> ms;
     ordered_json entry;
   };
@@ -333,7 +333,7 @@ ordered_json bench_frames(ocl::Device &device, const Subject &subject,
     renderer_options.size = {subject.frame.view.width, subject.frame.view.height};
     renderer_options.solver = solver;
     Run run{solver,
-            std::make_unique<Renderer>(device, subject.volume, renderer_options),
+            std::make_unique<DeviceRenderer>(device, subject.volume, renderer_options),
             {},
             solver_json(solver)};
     run.renderer->render(request);

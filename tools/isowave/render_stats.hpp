@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "core/render/renderer.hpp"
+#include "core/render/device_renderer.hpp"
 #include "core/view/camera.hpp"
 
 namespace isowave::core::tools {

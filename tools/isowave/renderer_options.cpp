@@ -90,32 +90,32 @@ RendererOptions to_renderer_options(const RendererFlags &flags, ImageSize size) 
   RendererOptions options = flags.values;
   options.size = size;
   options.with_levels |= flags.voxel_pixels > 0;
-  options.pipeline = flags.pipeline == "blocks" ? PipelineKind::kBlocks
-                     : flags.pipeline == "rays" ? PipelineKind::kRays
-                                                : PipelineKind::kAuto;
+  const bool is_blocks = flags.pipeline == "blocks";
+  const BlocksOptions of_blocks{.grouping = grouping_from_string(flags.grouping),
+                                .closest = closest_hit_from_string(flags.closest),
+                                .scanned_pairs = flags.speculation == "scanned"};
+  if (is_blocks) options.pipeline = blocks_pipeline(of_blocks);
   if (flags.speculation == "off") options.max_speculation = 1;
   // Measured: pipeline blocks needs twice the passes with it, and is no faster for decoding less
   // (bench/README.md).
   options.per_ray_speculation =
-      flags.speculation == "per-ray" ||
-      (flags.speculation == "auto" && options.pipeline != PipelineKind::kBlocks);
-  options.scanned_pairs = flags.speculation == "scanned";
+      flags.speculation == "per-ray" || (flags.speculation == "auto" && !is_blocks);
   options.solver = solver_from_string(flags.solver);
-  options.grouping = grouping_from_string(flags.grouping);
   options.stream = stream_place_from_string(flags.stream);
-  options.closest = closest_hit_from_string(flags.closest);
   return options;
 }
 
 nlohmann::ordered_json renderer_options_json(const RendererOptions &options) {
+  const BlocksOptions *blocks = blocks_options(*options.pipeline);
+  const BlocksOptions of_blocks = blocks != nullptr ? *blocks : BlocksOptions{};
   const char *speculation = options.max_speculation == 1  ? "off"
-                            : options.scanned_pairs       ? "scanned"
+                            : of_blocks.scanned_pairs     ? "scanned"
                             : options.per_ray_speculation ? "per-ray"
                                                           : "global";
-  return {{"pipeline", to_string(options.pipeline)},    {"speculation", speculation},
+  return {{"pipeline", options.pipeline->name()},       {"speculation", speculation},
           {"max_speculation", options.max_speculation}, {"cache_slots", options.cache_slots},
-          {"solver", to_string(options.solver)},        {"grouping", to_string(options.grouping)},
-          {"closest", to_string(options.closest)},      {"group_size", options.group_size},
+          {"solver", to_string(options.solver)},        {"grouping", to_string(of_blocks.grouping)},
+          {"closest", to_string(of_blocks.closest)},    {"group_size", options.group_size},
           {"stream", to_string(options.stream)}};
 }
 

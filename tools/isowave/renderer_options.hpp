@@ -5,7 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "core/render/renderer.hpp"
+#include "core/paper/blocks_pipeline.hpp"
+#include "core/render/device_renderer.hpp"
 #include "tools/isowave/volume_options.hpp"
 
 namespace isowave::core::tools {

@@ -8,7 +8,8 @@
 
 #include "core/base/error.hpp"
 #include "core/io/file_name.hpp"
-#include "core/render/renderer.hpp"
+#include "core/paper/blocks_pipeline.hpp"
+#include "core/render/device_renderer.hpp"
 #include "reference/stability_suite.hpp"
 #include "reference/watertight.hpp"
 #include "reference/watertight_device.hpp"
@@ -57,15 +58,13 @@ std::uint64_t verify_watertight(const VerifyArgs &options, Solver solver, ocl::D
   for (const RayBands bands : {RayBands::kOne, RayBands::kLevels}) {
     leaks += report_watertight(
         "twin", run_watertight(options.watertight, options.seed, solver, bands), surfaces);
-    for (const PipelineKind pipeline : {PipelineKind::kRays, PipelineKind::kBlocks}) {
-      if (device == nullptr || (bands == RayBands::kLevels && pipeline == PipelineKind::kBlocks))
-        continue;
+    for (const PipelinePtr &pipeline : {rays_pipeline(), blocks_pipeline()}) {
+      if (device == nullptr || (bands == RayBands::kLevels && !pipeline->has_levels())) continue;
       CompileReport compiling(*device);
       const auto results =
           run_watertight_on(*device, pipeline, options.watertight, options.seed, solver, bands);
       compiling.finish();
-      leaks +=
-          report_watertight(fmt::format("pipeline {}", to_string(pipeline)), results, surfaces);
+      leaks += report_watertight(fmt::format("pipeline {}", pipeline->name()), results, surfaces);
     }
   }
   return leaks;

@@ -4,6 +4,7 @@
 
 #include "core/accuracy/choose_detail.hpp"
 #include "core/base/error.hpp"
+#include "core/render/device_renderer.hpp"
 #include "core/zfp/isovalue.hpp"
 #include "reference/accuracy.hpp"
 #include "reference/bound_check.hpp"
@@ -37,7 +38,7 @@ std::uint64_t verify_errors(const VerifyFramesOptions &options, nlohmann::ordere
   std::vector<double> source(scene.volume.info.num_voxels());
   open_any_volume(options.input, to_overrides(options.volume))
       ->read_exact_layers(0, dims.z, source);
-  Renderer renderer(device, scene.volume, with_choices({.size = scene.size}, scene.volume));
+  DeviceRenderer renderer(device, scene.volume, with_choices({.size = scene.size}, scene.volume));
   compiling.finish();
   fmt::print("{:>9} {:>5} {:>9} {:>10} {:>10} {:>9} {:>10} {:>9} {:>10}\n", "isovalue", "view",
              "px chosen", "value", "pixels", "proven %", "uncertain", "exceeded", "slack p50");

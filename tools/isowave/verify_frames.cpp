@@ -8,7 +8,7 @@
 #include <span>
 
 #include "core/base/error.hpp"
-#include "core/render/renderer.hpp"
+#include "core/render/device_renderer.hpp"
 #include "core/zfp/isovalue.hpp"
 #include "reference/cell_oracle.hpp"
 #include "reference/embree_reach.hpp"
@@ -16,6 +16,7 @@
 #include "reference/ray_rounding.hpp"
 #include "reference/root_oracle.hpp"
 #include "reference/scalar_renderer.hpp"
+#include "reference/twin_renderer.hpp"
 #include "tools/isowave/accuracy_report.hpp"
 #include "tools/isowave/compile_report.hpp"
 
@@ -66,43 +67,32 @@ FrameJudge make_judge(const std::string &name, std::span<const float> voxels, co
   return judge;
 }
 
-/// Draws with the scalar reference, or with a device.
-class FrameDrawer {
- public:
-  FrameDrawer(const Scene &scene, std::span<const float> voxels, const std::string &device,
-              Solver solver, double voxel_error)
-      : scene_(scene), voxels_(voxels), solver_(solver), voxel_error_(voxel_error) {
-    if (device.empty()) return;
-    const ocl::DeviceInfo info = ocl::choose_device(device);
-    fmt::print("device {}: {} ({})\n", info.index, info.name, info.platform);
-    device_ = std::make_unique<ocl::Device>(info);
-    CompileReport compiling(*device_);
-    RendererOptions options;
-    options.size = scene.size;
-    options.solver = solver;
-    options.with_shading = false;
-    renderer_ = std::make_unique<Renderer>(*device_, scene.volume, options);
-    compiling.finish();
-  }
+/// The scalar reference, or a device's renderer.
+struct Drawer {
+  std::unique_ptr<ocl::Device> device;  ///< before the renderer, which it must outlive
+  std::unique_ptr<Renderer> renderer;
 
-  std::vector<HitRecord> draw(std::size_t view, const FrameParams &frame) {
-    if (!renderer_) return render_scalar(frame, voxels_, solver_);
-    renderer_->render({.camera = scene_.cameras[view],
-                       .isovalue = frame.surface.isovalue,
-                       .voxel_error = voxel_error_,
-                       .normals = Normals::kCell});
-    return renderer_->hits();
-  }
-  std::string name() const { return device_ ? device_->info().name : "scalar reference"; }
-
- private:
-  const Scene &scene_;
-  std::span<const float> voxels_;
-  Solver solver_;
-  double voxel_error_;
-  std::unique_ptr<ocl::Device> device_;  // before the renderer, which it must outlive
-  std::unique_ptr<Renderer> renderer_;
+  std::string name() const { return device ? device->info().name : "scalar reference"; }
 };
+
+Drawer make_drawer(const Scene &scene, const std::string &device, Solver solver) {
+  Drawer drawer;
+  if (device.empty()) {
+    drawer.renderer = std::make_unique<TwinRenderer>(scene.volume, scene.size, solver);
+    return drawer;
+  }
+  const ocl::DeviceInfo info = ocl::choose_device(device);
+  fmt::print("device {}: {} ({})\n", info.index, info.name, info.platform);
+  drawer.device = std::make_unique<ocl::Device>(info);
+  CompileReport compiling(*drawer.device);
+  RendererOptions options;
+  options.size = scene.size;
+  options.solver = solver;
+  options.with_shading = false;
+  drawer.renderer = std::make_unique<DeviceRenderer>(*drawer.device, scene.volume, options);
+  compiling.finish();
+  return drawer;
+}
 
 /// What the rows and the JSON entries of a run add up to.
 struct Totals {
@@ -159,8 +149,7 @@ std::uint64_t verify_frames(const VerifyFramesOptions &options,
                  seconds_since(begin));
     }
     for (const std::string &solver : solvers) {
-      FrameDrawer drawer(scene, voxels, options.device, solver_from_string(solver),
-                         options.frame.voxel_error);
+      const Drawer drawer = make_drawer(scene, options.device, solver_from_string(solver));
       print_accuracy_header(solver);
       for (std::size_t view = 0; view < scene.cameras.size(); ++view) {
         const FrameParams frame =
@@ -170,7 +159,11 @@ std::uint64_t verify_frames(const VerifyFramesOptions &options,
                                      {"solver", solver},
                                      {"isovalue", isovalue},
                                      {"view", view}};
-        const std::vector<HitRecord> hits = drawer.draw(view, frame);
+        drawer.renderer->render({.camera = scene.cameras[view],
+                                 .isovalue = frame.surface.isovalue,
+                                 .voxel_error = options.frame.voxel_error,
+                                 .normals = Normals::kCell});
+        const std::vector<HitRecord> hits = drawer.renderer->hits();
         judge_all(judges, frame, view, hits, labels, document, totals);
         const Quantiles rounding =
             quantiles(ray_rounding(scene.volume.info, scene.cameras[view], scene.size, hits));

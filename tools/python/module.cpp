@@ -34,6 +34,7 @@
 #include <set>
 #include <string>
 #include <thread>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -88,7 +89,7 @@ class PythonsEnd {
     std::unique_lock lock(mutex_);
     ending_thread_ = std::this_thread::get_id();
     is_near_ = true;
-    for (isowave::QuickRenderer *renderer : being_made_) renderer->give_up();
+    for (isowave::Renderer *renderer : being_made_) renderer->give_up();
     if (process_ != ::getpid()) {  // a forked one, without the threads that are counted
       is_over_ = true;
       return;
@@ -96,7 +97,7 @@ class PythonsEnd {
     const auto latest = std::chrono::steady_clock::now() + std::chrono::seconds(1);
     changed_.wait_until(lock, latest, [&] { return num_working_ == 0 && num_in_callbacks_ == 0; });
     changed_.wait(lock, [&] { return num_working_ == 0; });
-    for (isowave::QuickRenderer *renderer : being_made_) {
+    for (isowave::Renderer *renderer : being_made_) {
       try {
         renderer->wait();
       } catch (const Error &) {  // it was given up
@@ -148,12 +149,12 @@ class PythonsEnd {
     for (;;) ::pause();
   }
 
-  void begin_making(isowave::QuickRenderer &renderer) {
+  void begin_making(isowave::Renderer &renderer) {
     const std::lock_guard lock(mutex_);
     being_made_.insert(&renderer);
     if (is_near_) renderer.give_up();
   }
-  void end_making(isowave::QuickRenderer &renderer) {
+  void end_making(isowave::Renderer &renderer) {
     const std::lock_guard lock(mutex_);
     being_made_.erase(&renderer);
   }
@@ -177,7 +178,7 @@ class PythonsEnd {
   bool is_near_ = false, is_over_ = false;
   int num_working_ = 0;  ///< threads that work without the GIL, or wait for it afterwards
   int num_in_callbacks_ = 0;
-  std::set<isowave::QuickRenderer *> being_made_;
+  std::set<isowave::Renderer *> being_made_;
 };
 
 /// The library works in this thread without the GIL.
@@ -240,20 +241,31 @@ class Callbacks {
   /// Calls work() without the GIL, and raises what a callback has raised.
   template <class Work>
   auto without_gil(const Work &work) {
-    try {
+    const auto work_alone = [&] {
       const WithoutGil no_gil;
       return work();
+    };
+    try {
+      if constexpr (std::is_void_v<decltype(work())>) {
+        work_alone();
+        raise_again();
+        return;
+      } else {
+        auto result = work_alone();
+        raise_again();
+        return result;
+      }
     } catch (...) {
       if (!raised_) throw;
     }
     std::rethrow_exception(raised_);
   }
-  bool raised() const { return raised_ != nullptr; }
+
+ private:
   void raise_again() const {
     if (raised_) std::rethrow_exception(raised_);
   }
 
- private:
   std::exception_ptr raised_;
 };
 
@@ -573,85 +585,46 @@ nb::dict frame_dict(isowave::Frame &&frame, bool is_of_rays = false) {
 /// [count][6]
 using RayArray = nb::ndarray<double, nb::ro, nb::shape<-1, 6>, nb::c_contig>;
 
+/// "smooth", "cell"; of a request's enums, Python sets this one alone.
+isowave::Normals normals_of(const std::string &name) {
+  if (name != "smooth" && name != "cell") throw Error("normals '" + name + "': smooth or cell");
+  return name == "smooth" ? isowave::Normals::kSmooth : isowave::Normals::kCell;
+}
+
 isowave::FrameRequest request_of(const nb::dict &options) {
   isowave::FrameRequest request;
   const auto get = reader_of(options);
-  get("eye", request.camera.eye);
-  get("at", request.camera.at);
-  get("up", request.camera.up);
-  get("fovy_degrees", request.camera.fovy_degrees);
-  get("isovalue", request.isovalue);
-  get("width", request.size.width);
-  get("height", request.size.height);
-  get("samples", request.size.samples);
-  get("surface", request.appearance.surface);
-  get("background", request.appearance.background);
-  get("voxel_pixels", request.voxel_pixels);
-  get("voxel_error", request.voxel_error);
-  get("max_surface_error", request.max_surface_error);
-  get("time_budget_ms", request.time_budget_ms);
-  get("ambient_rays", request.ambient_rays);
-  get("want_picture", request.want_picture);
-  get("want_depth", request.want_depth);
-  get("want_normals", request.want_normals);
-  get("want_positions", request.want_positions);
-  get("want_hits", request.want_hits);
-  get("want_bounds", request.want_bounds);
-  bool smooth_normals = true;
-  get("smooth_normals", smooth_normals);
-  request.normals = smooth_normals ? isowave::Normals::kSmooth : isowave::Normals::kCell;
+  isowave::for_each_field(request, [&](const char *name, auto &field) {
+    using Field = std::decay_t<decltype(field)>;
+    if constexpr (std::is_same_v<Field, isowave::Normals>) {
+      std::string text = "smooth";
+      get(name, text);
+      field = normals_of(text);
+    } else if constexpr (!std::is_enum_v<Field>) {
+      get(name, field);
+    }
+  });
   return request;
 }
 
-/// Draws by any of the library's renderers.
-///
-/// on_pass     called after each pass with a PassView; False from it ends the frame
-/// interrupts  signals are looked for after each pass, which waits for that
-template <class AnyRenderer>
-nb::dict draw(AnyRenderer &renderer, const nb::dict &options,
-              const std::optional<nb::callable> &on_pass, bool interrupts) {
-  isowave::FrameRequest request = request_of(options);
-  Callbacks callbacks;
-  if (on_pass || interrupts) {
-    request.on_pass = [&](const isowave::Progress &progress) {
-      bool wanted = true;
-      const bool goes_on = callbacks.run([&] {
-        if (!on_pass) return;
-        auto *const view = new PassView(progress);
-        const nb::object owner = nb::cast(view, nb::rv_policy::take_ownership);
-        try {
-          wanted = nb::cast<bool>(call(*on_pass, owner));
-        } catch (...) {
-          view->end();
-          throw;
-        }
-        view->end();
-      });
-      return goes_on && wanted;
-    };
-  }
-  isowave::Frame frame = callbacks.without_gil([&] { return renderer.render(request); });
-  callbacks.raise_again();
-  return frame_dict(std::move(frame));
-}
-
-/// By any of the library's renderers. rays [count][6]: origin and direction.
-template <class AnyRenderer>
-nb::dict cast(AnyRenderer &renderer, const RayArray &rays, double isovalue, bool smooth) {
-  static_assert(sizeof(isowave::Ray) == 6 * sizeof(double));
-  const auto *first = reinterpret_cast<const isowave::Ray *>(rays.data());
-  isowave::Frame frame;
-  {
-    const WithoutGil no_gil;
-    frame = renderer.cast_rays({first, rays.shape(0)}, isovalue,
-                               smooth ? isowave::Normals::kSmooth : isowave::Normals::kCell);
-  }
-  return frame_dict(std::move(frame), true);
+isowave::RendererOptions renderer_options_of(const nb::dict &options) {
+  isowave::RendererOptions result;
+  const auto get = reader_of(options);
+  get("width", result.largest.width);
+  get("height", result.largest.height);
+  get("samples", result.largest.samples);
+  get("memory_budget", result.memory_budget);
+  get("cache_blocks", result.cache_blocks);
+  get("with_levels", result.with_levels);
+  get("with_bounds", result.with_bounds);
+  get("with_time_budget", result.with_time_budget);
+  get("with_rays", result.with_rays);
+  return result;
 }
 
 /// A renderer that is no longer wanted while it is being made. A thread of its own waits for the
 /// kernel that is being compiled. A process that ends before leaves the compiler as it is.
-void abandon(std::unique_ptr<isowave::QuickRenderer> renderer) {
+void abandon(std::unique_ptr<isowave::Renderer> renderer) {
   static std::atomic<int> num_abandoned = 0;
   static const int ends_at_once = ::on_exit(
       [](int status, void *) {
@@ -668,123 +641,6 @@ void abandon(std::unique_ptr<isowave::QuickRenderer> renderer) {
     --num_abandoned;
   }).detach();
 }
-
-/// A renderer, with the device that it draws on. Unless it is quick, the device draws each frame.
-class PyRenderer {
- public:
-  PyRenderer(const std::string &selector, const PyVolume &volume, const nb::dict &options) {
-    isowave::RendererOptions wanted;
-    const auto get = reader_of(options);
-    get("width", wanted.largest.width);
-    get("height", wanted.largest.height);
-    get("samples", wanted.largest.samples);
-    get("memory_budget", wanted.memory_budget);
-    get("cache_blocks", wanted.cache_blocks);
-    get("with_levels", wanted.with_levels);
-    get("with_bounds", wanted.with_bounds);
-    get("with_time_budget", wanted.with_time_budget);
-    get("with_rays", wanted.with_rays);
-    isowave::DeviceOptions device_options;
-    get("profiling", device_options.profiling);
-    bool quick = false;
-    get("quick", quick);
-    {
-      const WithoutGil no_gil;
-      device_ = isowave::open_device(selector, device_options);
-      renderer_.reset(new isowave::QuickRenderer(device_, volume.volume, wanted));
-      PythonsEnd::instance().begin_making(*renderer_);
-    }
-    if (quick) return;
-    try {
-      wait();
-    } catch (...) {
-      PythonsEnd::instance().end_making(*renderer_);
-      if (!ready()) abandon(std::unique_ptr<isowave::QuickRenderer>(renderer_.release()));
-      throw;
-    }
-  }
-
-  ~PyRenderer() { PythonsEnd::instance().end_making(*renderer_); }
-  PyRenderer(const PyRenderer &) = delete;
-  PyRenderer &operator=(const PyRenderer &) = delete;
-
-  nb::dict render(const nb::dict &options, const std::optional<nb::callable> &on_pass,
-                  bool interrupts) {
-    if (!isowave::HostRenderer::can_draw(request_of(options))) wait();
-    return draw(*renderer_, options, on_pass, interrupts);
-  }
-
-  nb::dict cast_rays(const RayArray &rays, double isovalue, bool smooth) {
-    return cast(*renderer_, rays, isovalue, smooth);
-  }
-
-  nb::tuple camera(double isovalue, std::uint32_t width, std::uint32_t height) {
-    isowave::Camera camera;
-    {
-      const WithoutGil no_gil;
-      camera = renderer_->camera(isovalue, isowave::ImageSize{width, height, 1});
-    }
-    return camera_tuple(camera);
-  }
-
-  bool ready() const { return renderer_->ready(); }
-  /// Until the device's renderer is made. Ctrl-C ends the wait.
-  void wait() const {
-    for (std::chrono::microseconds pause{200}; !renderer_->ready();) {
-      {
-        const WithoutGil no_gil;
-        std::this_thread::sleep_for(pause);
-      }
-      if (PyErr_CheckSignals() != 0) throw nb::python_error();
-      pause = std::min(pause * 5 / 4, std::chrono::microseconds{20'000});
-    }
-    const WithoutGil no_gil;
-    renderer_->wait();
-  }
-  nb::dict device() const {
-    nb::dict result = device_dict(device_->info());
-    result["notice"] = device_->notice();
-    return result;
-  }
-  std::uint64_t memory_bytes() const { return renderer_->memory_bytes(); }
-
- private:
-  std::shared_ptr<isowave::Device> device_;
-  std::unique_ptr<isowave::QuickRenderer, DestroyWithoutGil<isowave::QuickRenderer>> renderer_;
-};
-
-/// Draws on the host.
-class PyHostRenderer {
- public:
-  PyHostRenderer(const PyVolume &volume, std::uint64_t memory_limit) {
-    const WithoutGil no_gil;
-    renderer_ = std::make_unique<isowave::HostRenderer>(
-        volume.volume, isowave::HostRendererOptions{.memory_limit = memory_limit});
-  }
-
-  nb::dict render(const nb::dict &options, const std::optional<nb::callable> &on_pass,
-                  bool interrupts) {
-    return draw(*renderer_, options, on_pass, interrupts);
-  }
-
-  nb::dict cast_rays(const RayArray &rays, double isovalue, bool smooth) {
-    return cast(*renderer_, rays, isovalue, smooth);
-  }
-
-  nb::tuple camera(double isovalue, std::uint32_t width, std::uint32_t height) {
-    isowave::Camera camera;
-    {
-      const WithoutGil no_gil;
-      camera = renderer_->camera(isovalue, isowave::ImageSize{width, height, 1});
-    }
-    return camera_tuple(camera);
-  }
-
-  std::uint64_t memory_bytes() const { return renderer_->memory_bytes(); }
-
- private:
-  std::unique_ptr<isowave::HostRenderer> renderer_;
-};
 
 /// A Python object with rank, size, local_rank, all_gather() and reduce(): see _bricks.py.
 class PyProcesses : public isowave::Processes {
@@ -818,11 +674,11 @@ class PyProcesses : public isowave::Processes {
     });
   }
 
-  /// Calls work(), which calls these, without the GIL, and raises what they have raised.
+  /// Calls work(callbacks), which calls these, without the GIL, and raises what they have raised.
   template <class Work>
   auto without_gil(const Work &work) {
     callbacks_ = {};
-    return callbacks_.without_gil(work);
+    return callbacks_.without_gil([&] { return work(callbacks_); });
   }
 
  private:
@@ -836,49 +692,157 @@ class PyProcesses : public isowave::Processes {
   Callbacks callbacks_;
 };
 
-class PyBrickRenderer {
+/// Calls on_pass, if there is one, with a view of the picture so far. Returns whether the frame
+/// goes on.
+bool show_pass(Callbacks &callbacks, const std::optional<nb::callable> &on_pass,
+               const isowave::Progress &progress) {
+  bool wanted = true;
+  const bool goes_on = callbacks.run([&] {
+    if (!on_pass) return;
+    auto *const view = new PassView(progress);
+    const nb::object owner = nb::cast(view, nb::rv_policy::take_ownership);
+    try {
+      wanted = nb::cast<bool>(call(*on_pass, owner));
+    } catch (...) {
+      view->end();
+      throw;
+    }
+    view->end();
+  });
+  return goes_on && wanted;
+}
+
+/// Any of the library's renderers.
+class PyRenderer {
  public:
-  PyBrickRenderer(const nb::object &processes, const std::filesystem::path &path,
-                  const nb::dict &compression, const nb::dict &options)
-      : processes_(processes) {
+  using Owned = std::unique_ptr<isowave::Renderer, DestroyWithoutGil<isowave::Renderer>>;
+
+  /// Draws on a device; with the option "quick", on the host until kernels are compiled.
+  static std::unique_ptr<PyRenderer> on_device(const std::string &selector, const PyVolume &volume,
+                                               const nb::dict &options) {
+    const isowave::RendererOptions wanted = renderer_options_of(options);
+    const auto get = reader_of(options);
+    isowave::DeviceOptions device_options;
+    get("profiling", device_options.profiling);
+    bool quick = false;
+    get("quick", quick);
+    auto result = std::make_unique<PyRenderer>();
+    {
+      const WithoutGil no_gil;
+      result->renderer_.reset(new isowave::Renderer(isowave::make_quick_renderer(
+          isowave::open_device(selector, device_options), volume.volume, wanted)));
+      PythonsEnd::instance().begin_making(*result->renderer_);
+    }
+    if (quick) return result;
+    try {
+      result->wait();
+    } catch (...) {
+      PythonsEnd::instance().end_making(*result->renderer_);
+      if (!result->ready())
+        abandon(std::unique_ptr<isowave::Renderer>(result->renderer_.release()));
+      throw;
+    }
+    return result;
+  }
+  static std::unique_ptr<PyRenderer> on_host(const PyVolume &volume, std::uint64_t memory_limit) {
+    auto result = std::make_unique<PyRenderer>();
+    const WithoutGil no_gil;
+    result->renderer_.reset(new isowave::Renderer(
+        isowave::make_host_renderer(volume.volume, {.memory_limit = memory_limit})));
+    return result;
+  }
+  static std::unique_ptr<PyRenderer> of_team(const nb::object &processes,
+                                             const std::filesystem::path &path,
+                                             const nb::dict &compression, const nb::dict &options) {
     isowave::BrickOptions wanted;
     const auto get = reader_of(options);
     get("device", wanted.device);
     get("bricks", wanted.bricks);
-    get("width", wanted.renderer.largest.width);
-    get("height", wanted.renderer.largest.height);
-    get("samples", wanted.renderer.largest.samples);
-    get("memory_budget", wanted.renderer.memory_budget);
-    get("cache_blocks", wanted.renderer.cache_blocks);
-    get("with_levels", wanted.renderer.with_levels);
-    get("with_bounds", wanted.renderer.with_bounds);
-    get("with_rays", wanted.renderer.with_rays);
+    wanted.renderer = renderer_options_of(options);
     const isowave::Compression how = compression_of(compression);
-    processes_.without_gil([&] {
-      renderer_.reset(
-          new isowave::BrickRenderer(processes_, path, how, isowave::RawFile{}, wanted));
+    auto result = std::make_unique<PyRenderer>();
+    result->processes_ = std::make_unique<PyProcesses>(processes);
+    result->without_gil([&](Callbacks &) {
+      result->renderer_.reset(new isowave::Renderer(
+          isowave::make_team_renderer(*result->processes_, path, how, {}, wanted)));
     });
+    return result;
   }
 
-  nb::dict render(const nb::dict &options) {
-    const isowave::FrameRequest request = request_of(options);
-    return frame_dict(processes_.without_gil([&] { return renderer_->render(request); }));
+  PyRenderer() = default;
+  ~PyRenderer() {
+    if (renderer_) PythonsEnd::instance().end_making(*renderer_);
   }
+  PyRenderer(const PyRenderer &) = delete;
+  PyRenderer &operator=(const PyRenderer &) = delete;
+
+  /// on_pass     called after each pass with a PassView; False from it ends the frame
+  /// interrupts  signals are looked for after each pass, which waits for that
+  nb::dict render(const nb::dict &options, const std::optional<nb::callable> &on_pass,
+                  bool interrupts) {
+    isowave::FrameRequest request = request_of(options);
+    if (!renderer_->ready_for(request)) wait();
+    isowave::Frame frame = without_gil([&](Callbacks &callbacks) {
+      if (on_pass || interrupts) {
+        request.on_pass = [&](const isowave::Progress &progress) {
+          return show_pass(callbacks, on_pass, progress);
+        };
+      }
+      return renderer_->render(request);
+    });
+    return frame_dict(std::move(frame));
+  }
+
+  /// rays [count][6]: origin and direction.
+  nb::dict cast_rays(const RayArray &rays, double isovalue, const std::string &normals) {
+    static_assert(sizeof(isowave::Ray) == 6 * sizeof(double));
+    const auto *first = reinterpret_cast<const isowave::Ray *>(rays.data());
+    return frame_dict(
+        without_gil([&](Callbacks &) {
+          return renderer_->cast_rays({first, rays.shape(0)}, isovalue, normals_of(normals));
+        }),
+        true);
+  }
+
   nb::tuple camera(double isovalue, std::uint32_t width, std::uint32_t height) {
-    return camera_tuple(processes_.without_gil([&] {
+    return camera_tuple(without_gil([&](Callbacks &) {
       return renderer_->camera(isovalue, isowave::ImageSize{width, height, 1});
     }));
   }
-  nb::dict device() const { return device_dict(renderer_->device()); }
-  const isowave::Grid &grid() const { return renderer_->grid(); }
-  const std::vector<std::string> &notices() const { return renderer_->notices(); }
-  std::string isovalue_notice(double isovalue) const {
-    return renderer_->isovalue_notice(isovalue);
+
+  bool ready() const { return renderer_->ready(); }
+  /// Until the device's renderer is made. Ctrl-C ends the wait.
+  void wait() const {
+    for (std::chrono::microseconds pause{200}; !renderer_->ready();) {
+      {
+        const WithoutGil no_gil;
+        std::this_thread::sleep_for(pause);
+      }
+      if (PyErr_CheckSignals() != 0) throw nb::python_error();
+      pause = std::min(pause * 5 / 4, std::chrono::microseconds{20'000});
+    }
+    const WithoutGil no_gil;
+    renderer_->wait();
   }
+  nb::dict device() const {
+    nb::dict result = device_dict(renderer_->device_info());
+    result["notice"] = renderer_->device() ? renderer_->device()->notice() : std::string();
+    return result;
+  }
+  const isowave::Renderer &renderer() const { return *renderer_; }
 
  private:
-  PyProcesses processes_;  // which the renderer does not call when it goes
-  std::unique_ptr<isowave::BrickRenderer, DestroyWithoutGil<isowave::BrickRenderer>> renderer_;
+  /// Calls work(callbacks) without the GIL, and raises what a callback has raised.
+  template <class Work>
+  auto without_gil(const Work &work) {
+    if (processes_) return processes_->without_gil(work);
+    Callbacks callbacks;
+    return callbacks.without_gil([&] { return work(callbacks); });
+  }
+
+  std::unique_ptr<PyProcesses>
+      processes_;  ///< a team's; the renderer does not call it when it goes
+  Owned renderer_;
 };
 
 /// [height][width][3, or 4 with alpha]
@@ -978,37 +942,31 @@ NB_MODULE(_core, m) {
   m.def("open", &open_volume, "path"_a, "options"_a, "dims"_a.none(), "type"_a.none(),
         "spacing"_a.none(), "progress"_a.none());
 
-  nb::class_<PyHostRenderer>(m, "HostRenderer")
-      .def(nb::init<const PyVolume &, std::uint64_t>(), "volume"_a, "memory_limit"_a)
-      .def("render", &PyHostRenderer::render, "request"_a, "on_pass"_a.none(), "interrupts"_a)
-      .def("cast_rays", &PyHostRenderer::cast_rays, "rays"_a, "isovalue"_a, "smooth"_a)
-      .def("camera", &PyHostRenderer::camera, "isovalue"_a, "width"_a, "height"_a)
-      .def_prop_ro("memory_bytes", &PyHostRenderer::memory_bytes);
   nb::class_<PassView>(m, "PassView")
       .def_prop_ro("passes", &PassView::passes)
       .def_prop_ro("completed_percent", &PassView::completed_percent)
       .def("picture", &PassView::picture);
   nb::class_<PyRenderer>(m, "Renderer")
-      .def(nb::init<const std::string &, const PyVolume &, const nb::dict &>(), "device"_a,
-           "volume"_a, "options"_a)
       .def("render", &PyRenderer::render, "request"_a, "on_pass"_a.none(), "interrupts"_a)
-      .def("cast_rays", &PyRenderer::cast_rays, "rays"_a, "isovalue"_a, "smooth"_a)
+      .def("cast_rays", &PyRenderer::cast_rays, "rays"_a, "isovalue"_a, "normals"_a)
       .def("camera", &PyRenderer::camera, "isovalue"_a, "width"_a, "height"_a)
-      .def_prop_ro("device", &PyRenderer::device)
-      .def_prop_ro("ready", &PyRenderer::ready)
+      .def(
+          "isovalue_notice",
+          [](const PyRenderer &r, double isovalue) {
+            return r.renderer().isovalue_notice(isovalue);
+          },
+          "isovalue"_a)
       .def("wait", &PyRenderer::wait)
-      .def_prop_ro("memory_bytes", &PyRenderer::memory_bytes);
-  nb::class_<PyBrickRenderer>(m, "BrickRenderer")
-      .def(nb::init<const nb::object &, const std::filesystem::path &, const nb::dict &,
-                    const nb::dict &>(),
-           "processes"_a, "path"_a, "compression"_a, "options"_a)
-      .def("render", &PyBrickRenderer::render, "request"_a)
-      .def("camera", &PyBrickRenderer::camera, "isovalue"_a, "width"_a, "height"_a)
-      .def_prop_ro("device", &PyBrickRenderer::device)
-      .def_prop_ro("notices", &PyBrickRenderer::notices)
-      .def("isovalue_notice", &PyBrickRenderer::isovalue_notice, "isovalue"_a)
-      .def_prop_ro("dims", [](const PyBrickRenderer &r) { return r.grid().dims; })
-      .def_prop_ro("spacing", [](const PyBrickRenderer &r) { return r.grid().spacing; })
-      .def_prop_ro("origin", [](const PyBrickRenderer &r) { return r.grid().origin; })
-      .def_prop_ro("direction", [](const PyBrickRenderer &r) { return r.grid().direction; });
+      .def_prop_ro("ready", &PyRenderer::ready)
+      .def_prop_ro("device", &PyRenderer::device)
+      .def_prop_ro("memory_bytes", [](const PyRenderer &r) { return r.renderer().memory_bytes(); })
+      .def_prop_ro("notices", [](const PyRenderer &r) { return r.renderer().notices(); })
+      .def_prop_ro("dims", [](const PyRenderer &r) { return r.renderer().grid().dims; })
+      .def_prop_ro("spacing", [](const PyRenderer &r) { return r.renderer().grid().spacing; })
+      .def_prop_ro("origin", [](const PyRenderer &r) { return r.renderer().grid().origin; })
+      .def_prop_ro("direction", [](const PyRenderer &r) { return r.renderer().grid().direction; });
+  m.def("device_renderer", &PyRenderer::on_device, "device"_a, "volume"_a, "options"_a);
+  m.def("host_renderer", &PyRenderer::on_host, "volume"_a, "memory_limit"_a);
+  m.def("team_renderer", &PyRenderer::of_team, "processes"_a, "path"_a, "compression"_a,
+        "options"_a);
 }

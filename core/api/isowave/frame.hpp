@@ -86,8 +86,9 @@ struct FrameRequest {
   bool want_depth = false, want_normals = false, want_positions = false, want_hits = false;
   bool want_bounds = false;  ///< of the error of each pixel; needs RendererOptions::with_bounds
 
-  /// Called after each pass, those for smooth normals and ambient rays included. Return false to
-  /// stop; the frame is the picture so far.
+  /// Called after each pass, those for smooth normals and ambient rays included; on the host after
+  /// each band of rows, from the top. Return false to stop; the frame is the picture so far. In a
+  /// team, all processes have one or none, which return the same and ask for pictures alike.
   std::function<bool(const Progress &)> on_pass{};
 };
 
@@ -99,6 +100,41 @@ struct Hit {
   std::array<float, 3> position{};      ///< in the cell, 0 to 1
   std::array<float, 3> gradient{};      ///< FrameRequest::normals [voxel value per voxel]
 };
+
+/// Calls visit(name, field) for each field that a request consists of, those of its camera and
+/// appearance included, except on_pass. The names are those of isowave's Python package.
+///
+/// request  a FrameRequest, or a const one
+template <class Request, class Visit>
+void for_each_field(Request &request, const Visit &visit) {
+  visit("eye", request.camera.eye);
+  visit("at", request.camera.at);
+  visit("up", request.camera.up);
+  visit("fovy_degrees", request.camera.fovy_degrees);
+  visit("isovalue", request.isovalue);
+  visit("width", request.size.width);
+  visit("height", request.size.height);
+  visit("samples", request.size.samples);
+  visit("surface", request.appearance.surface);
+  visit("background", request.appearance.background);
+  visit("ambient", request.appearance.ambient);
+  visit("diffuse", request.appearance.diffuse);
+  visit("specular", request.appearance.specular);
+  visit("above", request.appearance.above);
+  visit("voxel_pixels", request.voxel_pixels);
+  visit("voxel_error", request.voxel_error);
+  visit("bound", request.bound);
+  visit("normals", request.normals);
+  visit("ambient_rays", request.ambient_rays);
+  visit("max_surface_error", request.max_surface_error);
+  visit("time_budget_ms", request.time_budget_ms);
+  visit("want_picture", request.want_picture);
+  visit("want_depth", request.want_depth);
+  visit("want_normals", request.want_normals);
+  visit("want_positions", request.want_positions);
+  visit("want_hits", request.want_hits);
+  visit("want_bounds", request.want_bounds);
+}
 
 struct FrameStatistics {
   std::uint32_t passes = 0;

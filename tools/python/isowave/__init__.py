@@ -16,12 +16,16 @@ from isowave import _loader
 _loader.prepare()
 
 from isowave._bricks import BrickRenderer  # noqa: E402
+from isowave._camera import Camera  # noqa: E402
+from isowave._compress import compress, open  # noqa: E402
 from isowave._core import Error, __version__  # noqa: E402
+from isowave._image import Image  # noqa: E402
 from isowave._levels import Level  # noqa: E402
 from isowave._mesh import Mesh  # noqa: E402
-from isowave._renderer import Camera, Image, Renderer  # noqa: E402
+from isowave._renderer import Renderer  # noqa: E402
 from isowave._report import Report, devices  # noqa: E402
-from isowave._volume import Volume, compress, open, view  # noqa: E402
+from isowave._volume import Volume  # noqa: E402
+from isowave.viewer import view  # noqa: E402
 
 __all__ = [
     "BrickRenderer",

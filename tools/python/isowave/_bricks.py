@@ -5,25 +5,20 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from isowave import _core
-from isowave._checked import flag, names, number, whole
+from isowave._camera import Camera
+from isowave._checked import flag, number, size_of, whole
+from isowave._compress import compression_options
+from isowave._image import Image
 from isowave._placed import Placed
-from isowave._renderer import (
-    Camera,
-    Color,
-    Image,
-    bytes_of,
-    camera_of,
-    request_for,
-    size_of,
-    warn_of_isovalue,
-)
-from isowave._volume import compression_options
+from isowave._renderer import bytes_of, warn_of_isovalue
+from isowave._request import Request
 
 OUTPUTS = ("rgb", "depth", "normals")
 ALL_OUTPUTS = (*OUTPUTS, "bounds")
@@ -173,17 +168,10 @@ class BrickRenderer(Placed[_core.BrickRenderer]):
         *,
         camera: Camera | None = None,
         size: tuple[int, int] | None = None,
-        samples: int = 1,
-        color: Color | None = None,
-        background: Color | None = None,
-        normals: str = "smooth",
         outputs: Sequence[str] = OUTPUTS,
-        max_error: float | None = None,
-        voxel_pixels: float = 0.0,
-        voxel_error: float = 0.0,
-        ambient: int = 0,
+        **more: Any,
     ) -> Image | None:
-        """Draws a frame; arguments as Renderer.render(). There are no positions.
+        """Draws a frame; arguments as Renderer.render(), without positions, time_budget, on_pass.
 
         `max_error` and the output "bounds" need bounds=True; the choice of detail, and the bounds,
         are those of one Renderer.
@@ -197,37 +185,28 @@ class BrickRenderer(Placed[_core.BrickRenderer]):
 
         Raises
         ------
-        Error, ValueError
-            At all processes, as Renderer.render(); and where they ask for different frames.
+        Error, TypeError, ValueError
+            At all processes, as Renderer.render(); and if they ask for different frames.
         """
+
+        def ask() -> Request:
+            request = Request(
+                isovalue, camera, self.size if size is None else size, outputs=outputs, **more
+            )
+            if "position" in request.outputs:
+                raise ValueError(f"outputs position: bricks have {', '.join(ALL_OUTPUTS)}")
+            for name in ("time_budget", "on_pass"):
+                if getattr(request, name) is not None:
+                    raise TypeError(f"a BrickRenderer draws without {name}")
+            return request
+
+        request = self._processes.together(ask)
         if len(set(self._processes.all_gather(b"" if camera is None else b"given"))) > 1:
             raise _core.Error("some processes give a camera, and others none: ask alike")
         if camera is None:
-            camera = self.camera(isovalue, size)
-
-        def ask() -> dict[str, Any]:
-            unknown = set(names("outputs", outputs)) - {*ALL_OUTPUTS}
-            if unknown:
-                listed = ", ".join(sorted(unknown))
-                raise ValueError(f"outputs {listed}: bricks have {', '.join(ALL_OUTPUTS)}")
-            return request_for(
-                isovalue,
-                camera,
-                self.size if size is None else size_of(size),
-                samples=samples,
-                color=color,
-                background=background,
-                normals=normals,
-                outputs=outputs,
-                max_error=max_error,
-                voxel_pixels=voxel_pixels,
-                voxel_error=voxel_error,
-                ambient=ambient,
-            )
-
-        request = self._processes.together(ask)
-        frame = self._core.render(request)
+            request = replace(request, camera=self.camera(request.isovalue, request.size))
+        frame = self._core.render(request.for_core())
         if self._processes.rank != 0:
             return None
-        warn_of_isovalue(self._core, request["isovalue"])
-        return Image(frame, camera_of(request), isovalue, samples, background)
+        warn_of_isovalue(self._core, request.isovalue)
+        return Image(frame, request)

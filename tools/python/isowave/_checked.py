@@ -54,6 +54,12 @@ def numbers(name: str, values: Any, count: int) -> tuple[float, ...]:
     return tuple(number(name, item) for item in items)
 
 
+def reversed_axes(values: Any) -> tuple[float, float, float]:
+    """A spacing or origin, (z, y, x), as (x, y, z)."""
+    z, y, x = numbers("spacing", values, 3)
+    return x, y, z
+
+
 def names(name: str, values: Any) -> tuple[str, ...]:
     try:
         if isinstance(values, str):
@@ -64,6 +70,17 @@ def names(name: str, values: Any) -> tuple[str, ...]:
     except TypeError:
         raise refuse(name, values, "a sequence of names, such as ('rgb', 'depth')") from None
     return items
+
+
+def size_of(size: Any) -> tuple[int, int]:
+    try:
+        sides = tuple(size)
+    except TypeError:
+        raise refuse("size", size, "width and height") from None
+    if len(sides) != 2:
+        raise ValueError(f"size={size!r:.60}: give width and height")
+    width, height = (whole("size", side) for side in sides)
+    return width, height
 
 
 def function(name: str, value: Any) -> Any:

@@ -1,18 +1,25 @@
-"""Levels of detail as arrays: what is indexed is decoded, and nothing else."""
+"""Compressed voxels as arrays, a volume's and its levels of detail: indexing decodes."""
 
 from __future__ import annotations
 
+import html
 import operator
+import os
+import uuid
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
-if TYPE_CHECKING:
-    from isowave._volume import Volume
+from isowave import _core
+from isowave._checked import number, whole
+from isowave._placed import Placed
+
+LARGEST_SAMPLE = 1 << 24  # voxels that a histogram is made of
 
 Shape = tuple[int, int, int]
+Same = TypeVar("Same", bound="Voxels")
 
 
 class Level:
@@ -29,7 +36,7 @@ class Level:
     ndim = 3
     dtype = np.dtype(np.float32)
 
-    def __init__(self, volume: Volume, number: int, shape: Sequence[int] | None = None) -> None:
+    def __init__(self, volume: Voxels, number: int, shape: Sequence[int] | None = None) -> None:
         """shape: of the voxels from (0, 0, 0) on, where not all are wanted."""
         self._volume, self._number = volume, number
         nz, ny, nx = reversed(volume._core.level_dims(number)) if shape is None else shape
@@ -88,6 +95,178 @@ class Level:
             (x[-1] + 1, y[-1] + 1, z[-1] + 1),
             (x.step, y.step, z.step),
         )
+
+
+class Voxels(Placed[_core.Volume]):
+    """A volume's voxels: an array of float32, (z, y, x), that is decoded where it is indexed."""
+
+    ndim = 3
+    dtype = Level.dtype  # of what indexing gives
+
+    def __init__(self, core: _core.Volume) -> None:
+        self._core = core
+        self._token = uuid.uuid4().hex
+
+    @property
+    def size(self) -> int:
+        """Voxels."""
+        return self.levels[0].size
+
+    @property
+    def source_dtype(self) -> np.dtype[Any]:
+        """Of the voxels before compression."""
+        return np.dtype(self._core.source_type)
+
+    @property
+    def value_range(self) -> tuple[float, float]:
+        """Least and largest voxel before compression; infinite where a file does not say."""
+        least, largest = self._core.value_range
+        return least, largest
+
+    @property
+    def nbytes(self) -> int:
+        """Of the compressed voxels."""
+        return self._core.compressed_bytes
+
+    @property
+    def compression(self) -> str:
+        """How blocks are stored: "reversible" (all bits of float32), "whole numbers" (rounded to
+        the source's integers), "fixed accuracy" or "fixed rate"."""
+        return self._core.compression
+
+    @property
+    def bits_per_voxel(self) -> float:
+        return self._core.bits_per_voxel
+
+    @property
+    def max_error(self) -> float | None:
+        """Largest difference between a decoded voxel and the source; None: not measured."""
+        return self._core.max_voxel_error
+
+    @property
+    def errors_are_stated(self) -> bool:
+        """Whether errors and `value_range` are those that a .zfp file states.
+
+        The source is not there to check them: bounds of images hold if the file's writer is right.
+        False: they were measured when this volume was compressed.
+        """
+        return self._core.errors_are_stated
+
+    def isovalue_notice(self, isovalue: float) -> str:
+        """The warning that drawing this isovalue gives if it is outside the source's values, or
+        ""."""
+        return self._core.isovalue_notice(number("isovalue", isovalue))
+
+    @property
+    def num_levels(self) -> int:
+        """Levels of detail, the volume itself among them."""
+        return self._core.num_levels
+
+    def level_shape(self, level: int) -> tuple[int, int, int]:
+        """Voxels of a level along (z, y, x). Voxel k of it lies at voxel 2^level k of the volume.
+
+        Sides are halved, and one is added: a level may end up to a voxel of its own behind the
+        volume.
+        """
+        x, y, z = self._core.level_dims(self._checked(level))
+        return z, y, x
+
+    def _checked(self, level: int) -> int:
+        if isinstance(level, (bool, float, str)):
+            whole("level", level)
+        if not 0 <= level < self.num_levels:
+            raise ValueError(f"level {level} of a volume that has {self.num_levels}: from 0 on")
+        return level
+
+    @property
+    def levels(self) -> tuple[Level, ...]:
+        """The levels of detail as arrays, the volume itself first: volume.levels[2][5]."""
+        return tuple(Level(self, number) for number in range(self.num_levels))
+
+    def decode(self, level: int = 0, region: Any = ...) -> npt.NDArray[np.float32]:
+        """Voxels of a level of detail, float32, (z, y, x).
+
+        Parameters
+        ----------
+        level
+            Each has half the voxels of the last along each axis.
+        region
+            What one would index an array of the level with: numpy.s_[10:20, :, 5]. Only the blocks
+            of 4 x 4 x 4 voxels that hold these voxels are decoded.
+
+        Raises
+        ------
+        ValueError
+            There is no such level.
+        IndexError
+            The region is none of the level, in one line.
+        """
+        voxels: npt.NDArray[np.float32] = np.asarray(self.levels[self._checked(level)][region])
+        return voxels
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __iter__(self) -> Iterator[npt.NDArray[np.float32]]:
+        return iter(self.levels[0])
+
+    def __getitem__(self, key: Any) -> Any:
+        return self.levels[0][key]
+
+    def __array__(
+        self, dtype: npt.DTypeLike | None = None, copy: bool | None = None
+    ) -> npt.NDArray[Any]:
+        return self.levels[0].__array__(dtype, copy)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes a .zfp file, which open() and the program read; whole, or not at all."""
+        self._core.save(os.fsdecode(path))
+
+    def __copy__(self: Same) -> Same:
+        return self
+
+    def __deepcopy__(self: Same, memo: object) -> Same:
+        return self
+
+    def __dask_tokenize__(self) -> object:
+        """Whatever names dask's chunks of these voxels, and of no others."""
+        return self._token
+
+    def histogram(self, bins: int = 256) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]]:
+        """Counts [bins] and edges [bins + 1] of the values, as numpy.histogram gives them.
+
+        Of a large volume, of blocks that are spread over it: at most 2^24 voxels.
+        """
+        bins = whole("bins", bins)
+        values = self._core.sample(LARGEST_SAMPLE)
+        least, largest = self.value_range
+        if not np.isfinite([least, largest]).all():
+            least, largest = float(values.min()), float(values.max())
+        counts, edges = np.histogram(np.clip(values, least, largest), bins, (least, largest))
+        return counts.astype(np.int64), edges.astype(np.float64)
+
+    def __repr__(self) -> str:
+        shape = " x ".join(str(n) for n in self.shape)
+        return (
+            f"<isowave.Volume {shape} (z, y, x) {self.source_dtype}, "
+            f"{self.nbytes / 2**20:.1f} MiB, {self.bits_per_voxel:.2f} bits a voxel>"
+        )
+
+    def _repr_html_(self) -> str:
+        least, largest = self.value_range
+        rows = {
+            "shape (z, y, x)": " x ".join(str(n) for n in self.shape),
+            "spacing": ", ".join(f"{s:g}" for s in self.spacing),
+            "values": f"{self.source_dtype}, {least:g} to {largest:g}",
+            "compressed": f"{self.nbytes / 2**20:.1f} MiB, {self.bits_per_voxel:.2f} bits a voxel",
+            "largest error": "not known" if self.max_error is None else f"{self.max_error:.3g}",
+            "levels of detail": str(self.num_levels),
+        }
+        cells = "".join(
+            f"<tr><th style='text-align:left'>{html.escape(name)}</th><td>{html.escape(text)}</td>"
+            for name, text in rows.items()
+        )
+        return f"<table>{cells}</table>"
 
 
 def split_key(key: Any, shape: Sequence[int]) -> tuple[list[range], tuple[Any, ...]]:

@@ -8,6 +8,7 @@ import subprocess
 import sys
 
 from isowave import _loader
+from isowave.viewer import command
 
 PROGRAM = _loader.PACKAGE / "bin" / "isowave"
 VIEW = "  view                        Show a volume in a browser: isowave view --help"
@@ -17,9 +18,7 @@ def main() -> int:
     """Does not return where the program takes over the process."""
     arguments = sys.argv[1:]
     if arguments[:1] == ["view"]:
-        from isowave.viewer import main as view
-
-        return view(arguments[1:])
+        return command.main(arguments[1:])
     if _loader.found["loader"] == str(_loader.BUNDLED_LOADER):
         folders = [str(_loader.BUNDLED_LOADER.parent), os.environ.get("LD_LIBRARY_PATH", "")]
         os.environ["LD_LIBRARY_PATH"] = ":".join(filter(None, folders))

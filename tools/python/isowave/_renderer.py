@@ -1,291 +1,31 @@
-"""Renderers, cameras and pictures."""
+"""Renderers."""
 
 from __future__ import annotations
 
-import dataclasses
-import math
-import os
 import queue
-import re
 import sys
 import threading
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from isowave import _core
-from isowave._checked import flag, function, names, number, numbers, refuse, whole
+from isowave._camera import Camera
+from isowave._checked import flag, number, refuse, size_of, whole
+from isowave._image import Image
+from isowave._levels import Voxels
+from isowave._request import ALL_OUTPUTS, Color, Progress, Request, is_smooth
 
-if TYPE_CHECKING:
-    from isowave._volume import Volume
-
-Color = str | Sequence[float]  # "#rrggbb", or red, green, blue from 0 to 1
-WHITE = (1.0, 1.0, 1.0)  # the background where none is given, as isowave::Appearance has it
-ALL_OUTPUTS = ("rgb", "depth", "normals", "position")
-#: Of Renderer's arguments, what frames may ask for only if it was given.
+#: Arguments of Renderer that let frames ask for more.
 CAPABILITIES = ("levels", "bounds", "time_budget", "rays")
-
-
-@dataclasses.dataclass(frozen=True)
-class Camera:
-    """A pinhole camera in world space; vectors are (x, y, z)."""
-
-    eye: tuple[float, float, float]
-    at: tuple[float, float, float]
-    up: tuple[float, float, float] = (0.0, 1.0, 0.0)
-    fovy: float = 60.0  #: angle between the picture's lower and upper edge [degrees]
-
-    @staticmethod
-    def orbit(volume: Volume, count: int) -> list[Camera]:
-        """Cameras around the volume's box, as those of `isowave render --orbit`.
-
-        They stand on a circle about the y axis, 20 degrees above its plane, 0.8 diagonals of the
-        box from its centre.
-        """
-        corner = np.array(volume.origin[::-1])
-        extent = (np.array(volume.shape[::-1]) - 1) * volume.spacing[::-1]
-        centre = corner + volume.direction @ (extent / 2)
-        distance = 0.8 * float(np.linalg.norm(extent))
-        elevation = math.radians(20)
-        cameras = []
-        count = whole("count", count)
-        for i in range(count):
-            azimuth = 2 * math.pi * i / count + 0.3
-            towards = (
-                math.sin(azimuth) * math.cos(elevation),
-                math.sin(elevation),
-                math.cos(azimuth) * math.cos(elevation),
-            )
-            cameras.append(Camera(vector(centre + distance * np.array(towards)), vector(centre)))
-        return cameras
-
-    @staticmethod
-    def from_pyvista(camera: Any) -> Camera:
-        """The view of a pyvista.Camera, or of a plotter's `camera`; of perspective projection."""
-        if getattr(camera, "parallel_projection", False):
-            raise ValueError("isowave has perspective cameras only, not of parallel projection")
-        return Camera(
-            vector(camera.position),
-            vector(camera.focal_point),
-            vector(camera.up),
-            float(camera.view_angle),
-        )
-
-
-def vector(values: Any) -> tuple[float, float, float]:
-    x, y, z = (float(value) for value in values)
-    return x, y, z
-
-
-def size_of(size: Sequence[int]) -> tuple[int, int]:
-    try:
-        sides = tuple(size)
-    except TypeError:
-        raise refuse("size", size, "width and height") from None
-    if len(sides) != 2:
-        raise ValueError(f"size={size!r:.60}: give width and height")
-    width, height = (whole("size", side) for side in sides)
-    return width, height
-
-
-def color_of(color: Color) -> tuple[float, float, float]:
-    if isinstance(color, str):
-        digits = re.fullmatch("#([0-9a-fA-F]{2})([0-9a-fA-F]{2})([0-9a-fA-F]{2})", color)
-        if not digits:
-            raise ValueError(f"color {color!r}: give '#rrggbb', or red, green, blue from 0 to 1")
-        return vector(int(part, 16) / 255 for part in digits.groups())
-    color = numbers("color", color, 3)
-    if not all(0 <= part <= 1 for part in color):
-        raise ValueError(f"color {tuple(color)}: give red, green and blue, from 0 to 1")
-    return vector(color)
-
-
-class Image:
-    """A picture, and what it shows. Arrays are None where they were not asked for.
-
-    Rows go from top to bottom. Where several rays were drawn for each pixel, depth, normals,
-    position and bounds have `samples` times as many rows and columns: one entry for each ray.
-    """
-
-    rgb: npt.NDArray[np.uint8] | None  #: (height, width, 3)
-    depth: npt.NDArray[np.float32] | None  #: distance from the eye [world units]; inf: no surface
-    normals: npt.NDArray[np.float32] | None
-    """(rows, columns, 3), (x, y, z) in world space, of length 1, away from larger values; 0 where
-    there is no surface."""
-    position: npt.NDArray[np.float32] | npt.NDArray[np.float64] | None
-    """(rows, columns, 3), world space; nan: no surface. float64 if float32 would lose more than
-    1/4096 voxel, as it does far from the origin."""
-    bounds: npt.NDArray[np.float32] | None
-    """How far the surface is from that of the volume before compression, at most [pixels]; inf:
-    nothing is certain. They hold if the volume's errors do, which a file may state wrongly:
-    `statistics["errors_are_stated"]`, as `Volume.errors_are_stated`."""
-
-    def __init__(
-        self,
-        frame: dict[str, Any],
-        camera: Camera,
-        isovalue: float,
-        samples: int,
-        background: Color | None = None,
-    ) -> None:
-        self.rgb = frame.get("picture")
-        self.depth = frame.get("depth")
-        self.normals = frame.get("normals")
-        self.position = frame.get("positions")
-        self.bounds = frame.get("bounds")
-        #: What drawing took: passes, rays, hits, decoded_blocks, total_ms and so on.
-        self.statistics: dict[str, Any] = frame["statistics"]
-        self.camera = camera
-        self.isovalue = isovalue
-        self._samples = samples
-        self._background = WHITE if background is None else color_of(background)
-
-    @property
-    def complete(self) -> bool:
-        """False where the frame was stopped, or its time was over."""
-        return bool(self.statistics["complete"])
-
-    @property
-    def rgba(self) -> npt.NDArray[np.uint8]:
-        """(height, width, 4); alpha is the part of a pixel that the surface covers.
-
-        Colours are the surface's alone, without the background. Opaque where depth was not asked
-        for.
-        """
-        rgb = self._rgb()
-        if self.depth is None:
-            return np.dstack((rgb, np.full(rgb.shape[:2], 255, np.uint8)))
-        s = self._samples
-        hit = np.isfinite(self.depth).reshape(rgb.shape[0], s, rgb.shape[1], s)
-        covered = hit.mean(axis=(1, 3))
-        edge = (covered > 0) & (covered < 1)
-        if edge.any():  # there, rays that met nothing have mixed the background in
-            part = covered[edge][:, None]
-            surface = (rgb[edge] - (1 - part) * 255 * np.array(self._background)) / part
-            rgb = rgb.copy()
-            rgb[edge] = np.rint(surface.clip(0, 255))
-        return np.dstack((rgb, np.rint(255 * covered).astype(np.uint8)))
-
-    def _rgb(self) -> npt.NDArray[np.uint8]:
-        if self.rgb is None:
-            raise ValueError("the picture was not asked for: render(..., outputs=('rgb', ...))")
-        return self.rgb
-
-    def __array__(
-        self, dtype: npt.DTypeLike | None = None, copy: bool | None = None
-    ) -> npt.NDArray[Any]:
-        return np.asarray(self.rgba, dtype)
-
-    def _repr_png_(self) -> bytes:
-        return _core.encode_png(self._rgb())
-
-    def save(self, path: str | os.PathLike[str], *, alpha: bool = False) -> None:
-        """Writes a .png file; whole, or not at all.
-
-        alpha: writes `rgba`, transparent where there is no surface, in place of `rgb`.
-        """
-        _core.save_png(self.rgba if flag("alpha", alpha) else self._rgb(), os.fsdecode(path))
-
-    def __repr__(self) -> str:
-        shown = "" if self.rgb is None else f"{self.rgb.shape[1]} x {self.rgb.shape[0]}, "
-        return f"<isowave.Image {shown}isovalue {self.isovalue:g}>"
-
-
-class Progress:
-    """The picture so far, for on_pass; only until that returns."""
-
-    def __init__(self, view: _core.PassView) -> None:
-        self._view = view
-
-    @property
-    def passes(self) -> int:
-        return self._view.passes
-
-    @property
-    def completed_percent(self) -> float:
-        """Rays that have ended, of all."""
-        return self._view.completed_percent
-
-    @property
-    def rgb(self) -> npt.NDArray[np.uint8]:
-        """(height, width, 3), drawn when it is asked for; within a time budget, first smaller."""
-        return self._view.picture()
 
 
 def bytes_of(memory_budget: int | None) -> int | None:
     return None if memory_budget is None else whole("memory_budget", memory_budget, 2**64 - 1)
-
-
-def needed_options(request: dict[str, Any]) -> dict[str, Any]:
-    """What a Renderer must be made with to draw such a request."""
-    bounds = request.get("max_error") is not None or "bounds" in names(
-        "outputs", request.get("outputs", ())
-    )
-    needed: dict[str, Any] = {
-        "bounds": bounds,
-        "time_budget": request.get("time_budget") is not None,
-        "rays": request.get("ambient", 0) != 0,
-    }
-    needed["levels"] = bool(bounds or request.get("voxel_pixels") or needed["time_budget"])
-    if request.get("samples", 1) != 1:
-        needed["samples"] = request["samples"]
-    return needed
-
-
-def is_smooth(normals: str) -> bool:
-    if normals not in ("smooth", "cell"):
-        raise ValueError(f"normals {normals!r}: give 'smooth' or 'cell'")
-    return normals == "smooth"
-
-
-def request_for(
-    isovalue: float,
-    camera: Camera,
-    size: tuple[int, int],
-    *,
-    samples: int = 1,
-    color: Color | None = None,
-    background: Color | None = None,
-    normals: str = "smooth",
-    outputs: Sequence[str] = ALL_OUTPUTS,
-    max_error: float | None = None,
-    voxel_pixels: float = 0.0,
-    voxel_error: float = 0.0,
-    time_budget: float | None = None,
-    ambient: int = 0,
-) -> dict[str, Any]:
-    """What the compiled part is asked for; arguments as Renderer.render()."""
-    if not isinstance(camera, Camera):
-        raise refuse("camera", camera, "an isowave.Camera")
-    outputs = names("outputs", outputs)
-    return {
-        "eye": numbers("Camera.eye", camera.eye, 3),
-        "at": numbers("Camera.at", camera.at, 3),
-        "up": numbers("Camera.up", camera.up, 3),
-        "fovy_degrees": number("Camera.fovy", camera.fovy),
-        "isovalue": number("isovalue", isovalue),
-        "width": size[0],
-        "height": size[1],
-        "samples": whole("samples", samples),
-        "surface": None if color is None else color_of(color),
-        "background": None if background is None else color_of(background),
-        "smooth_normals": is_smooth(normals),
-        "voxel_pixels": number("voxel_pixels", voxel_pixels),
-        "voxel_error": number("voxel_error", voxel_error),
-        "max_surface_error": None if max_error is None else number("max_error", max_error),
-        "time_budget_ms": (
-            None if time_budget is None else 1000 * number("time_budget", time_budget)
-        ),
-        "ambient_rays": whole("ambient", ambient),
-        "want_picture": "rgb" in outputs,
-        "want_depth": "depth" in outputs,
-        "want_normals": "normals" in outputs,
-        "want_positions": "position" in outputs,
-        "want_bounds": "bounds" in outputs,
-    }
 
 
 def warn_of_isovalue(core: _core.Volume | _core.BrickRenderer, isovalue: float) -> None:
@@ -299,18 +39,11 @@ def warn_of_isovalue(core: _core.Volume | _core.BrickRenderer, isovalue: float) 
     warnings.warn(notice, RuntimeWarning, stacklevel=level)
 
 
-def camera_of(request: dict[str, Any]) -> Camera:
-    return Camera(request["eye"], request["at"], request["up"], request["fovy_degrees"])
-
-
 def draw(
-    renderer: _core.Renderer | _core.HostRenderer,
-    request: dict[str, Any],
-    on_pass: Callable[[Progress], bool | None] | None = None,
-    interrupts: bool = True,
+    renderer: _core.Renderer | _core.HostRenderer, request: Request, interrupts: bool = True
 ) -> dict[str, Any]:
     """The frame's arrays. interrupts: Ctrl-C is looked for after each pass."""
-    function("on_pass", on_pass)
+    on_pass = request.on_pass
 
     def callback(view: _core.PassView) -> bool:
         assert on_pass is not None
@@ -318,7 +51,8 @@ def draw(
         return answer is None or flag("what on_pass returns", answer)
 
     is_main = threading.current_thread() is threading.main_thread()
-    return renderer.render(request, None if on_pass is None else callback, interrupts and is_main)
+    watched = None if on_pass is None else callback
+    return renderer.render(request.for_core(), watched, interrupts and is_main)
 
 
 def positions_of(volume: _core.Volume, positions: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
@@ -384,7 +118,7 @@ class Renderer:
 
     def __init__(
         self,
-        volume: Volume,
+        volume: Voxels,
         *,
         device: str | int | None = None,
         size: tuple[int, int] = (1280, 720),
@@ -516,55 +250,45 @@ class Renderer:
         Error
             A request that the renderer was not made for, in one line. The next is not affected.
         """
-        self._check_turn()
-        self._check(max_error, voxel_pixels, time_budget, ambient, outputs)
-        picture_size = self.size if size is None else size_of(size)
-        request = request_for(
-            isovalue,
-            camera or self.camera(isovalue, picture_size),
-            picture_size,
-            samples=samples,
-            color=color,
-            background=background,
-            normals=normals,
-            outputs=outputs,
-            max_error=max_error,
-            voxel_pixels=voxel_pixels,
-            voxel_error=voxel_error,
-            time_budget=time_budget,
-            ambient=ambient,
+        return self.draw(
+            Request(
+                isovalue,
+                camera,
+                size,
+                samples,
+                color,
+                background,
+                normals,
+                outputs,
+                max_error,
+                voxel_pixels,
+                voxel_error,
+                time_budget,
+                ambient,
+                on_pass,
+            )
         )
+
+    def draw(self, request: Request) -> Image:
+        """Draws a frame, as render()."""
+        self._check_turn()
+        for option, argument in request.needs.items():
+            if not self._can[option]:
+                raise _core.Error(f"{argument} needs a renderer that was made with {option}=True")
+        request = self._completed(request)
         # On a GPU, frames end sooner than a person presses Ctrl-C, and looking for it after each
         # pass would cost time.
         interrupts = self.device["type"] != "gpu"
-        warn_of_isovalue(self._volume, request["isovalue"])
-        frame = draw(self._core, request, on_pass, interrupts)
+        warn_of_isovalue(self._volume, request.isovalue)
+        frame = draw(self._core, request, interrupts)
         if "positions" in frame:
             frame["positions"] = positions_of(self._volume, frame["positions"])
-        return Image(frame, camera_of(request), isovalue, samples, background)
+        return Image(frame, request)
 
-    def _check(
-        self,
-        max_error: float | None,
-        voxel_pixels: float,
-        time_budget: float | None,
-        ambient: int,
-        outputs: Sequence[str],
-    ) -> None:
-        outputs = names("outputs", outputs)
-        unknown = set(outputs) - {*ALL_OUTPUTS, "bounds"}
-        if unknown:
-            known = ", ".join((*ALL_OUTPUTS, "bounds"))
-            raise ValueError(f"outputs {', '.join(sorted(unknown))}: there are {known}")
-        asked = {
-            "bounds": ("max_error", max_error is not None or "bounds" in outputs),
-            "levels": ("voxel_pixels", number("voxel_pixels", voxel_pixels) > 0),
-            "time_budget": ("time_budget", time_budget is not None),
-            "rays": ("ambient", whole("ambient", ambient) != 0),
-        }
-        for option, (argument, is_asked) in asked.items():
-            if is_asked and not self._can[option]:
-                raise _core.Error(f"{argument} needs a renderer that was made with {option}=True")
+    def _completed(self, request: Request) -> Request:
+        size = request.size or self.size
+        camera = request.camera or self.camera(request.isovalue, size)
+        return replace(request, size=size, camera=camera)
 
     def cast_rays(
         self, rays: npt.ArrayLike, isovalue: float, *, normals: str = "smooth"
@@ -581,16 +305,14 @@ class Renderer:
         state = "" if self.ready else ", not ready"
         return f"<isowave.Renderer {width} x {height}, {self.device['name']}{state}>"
 
-    def passes(self, isovalue: float, **request: Any) -> Iterator[Image]:
+    def passes(self, isovalue: float, **more: Any) -> Iterator[Image]:
         """The picture after each pass, the last one finished; arguments as render().
 
-        Pictures before the last have rgb alone. The frame waits while nobody asks for the next, and
-        ends where the iterator is closed.
+        Pictures before the last have rgb alone. The frame waits until the next picture is asked
+        for, and ends when the iterator is closed.
         """
         pictures: queue.Queue[Image | BaseException | None] = queue.Queue(maxsize=1)
         closed = threading.Event()
-        camera = request.pop("camera", None) or self.camera(isovalue, request.get("size"))
-        samples = request.get("samples", 1)
 
         def put(item: Image | BaseException | None) -> None:
             while not closed.is_set() and not _core.is_ending():
@@ -601,21 +323,21 @@ class Renderer:
                 return
 
         def on_pass(progress: Progress) -> bool:
-            if progress.completed_percent == 100 and not request.get("ambient"):
+            if progress.completed_percent == 100 and not request.ambient:
                 return True  # the finished picture follows
             statistics: dict[str, Any] = {"passes": progress.passes, "complete": False}
             statistics["completed_percent"] = progress.completed_percent
-            frame = {"picture": progress.rgb, "statistics": statistics}
-            put(Image(frame, camera, isovalue, samples, request.get("background")))
+            put(Image({"picture": progress.rgb, "statistics": statistics}, request))
             return not closed.is_set() and not _core.is_ending()
 
         def draw() -> None:
             try:
-                put(self.render(isovalue, camera=camera, on_pass=on_pass, **request))
-            except BaseException as error:  # noqa: BLE001: raised by the one who iterates
+                put(self.draw(request))
+            except BaseException as error:  # noqa: BLE001: the loop over the passes raises it
                 put(error)
             put(None)
 
+        request = self._completed(Request(isovalue, on_pass=on_pass, **more))
         thread = threading.Thread(target=draw, name="isowave passes", daemon=True)
         thread.start()
         try:

@@ -1,59 +1,34 @@
-"""Compressed volumes: from arrays and files to pictures."""
+"""Compressed volumes, and what is drawn of them."""
 
 from __future__ import annotations
 
-import html
 import os
 import pathlib
-import sys
 import tempfile
 import threading
-import uuid
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from isowave import _core
-from isowave._arrays import as_source
-from isowave._checked import flag, function, number, numbers, whole
-from isowave._levels import Level
+from isowave import _core, viewer
+from isowave._checked import flag, function, number, reversed_axes, whole
+from isowave._camera import Camera
+from isowave._image import Image
+from isowave._levels import Voxels
 from isowave._mesh import Mesh
-from isowave._placed import Placed
 from isowave._renderer import (
     CAPABILITIES,
-    Camera,
-    Image,
     Renderer,
     cast_rays,
     draw,
-    needed_options,
     positions_of,
-    request_for,
-    size_of,
     warn_of_isovalue,
 )
-
-#: Called with what is done ("compressing") and how much of it, 0 to 1.
-Progress = Callable[[str, float], object]
-
-SUPPORTED_TYPES = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64")
-LARGEST_SAMPLE = 1 << 24  # voxels that a histogram is made of
-
-
-def reversed_axes(values: Sequence[float]) -> tuple[float, float, float]:
-    z, y, x = numbers("spacing", values, 3)
-    return x, y, z
-
-
-def dims_of(shape: Sequence[int]) -> tuple[int, int, int]:
-    try:
-        z, y, x = tuple(shape)
-    except (TypeError, ValueError):
-        raise TypeError(f"shape={shape!r:.60}: give three whole numbers") from None
-    return whole("shape", x), whole("shape", y), whole("shape", z)
+from isowave._request import Request
 
 
 class Turns:
@@ -83,231 +58,7 @@ class Turns:
         self._lock.release()
 
 
-def compression_options(
-    tolerance: float | None,
-    relative_tolerance: float | None,
-    rate: int | None,
-    exact: bool,
-    levels: int,
-    map_nan: float | None,
-    no_data: float | None,
-    num_threads: int,
-) -> dict[str, Any]:
-    return {
-        "tolerance": None if tolerance is None else number("tolerance", tolerance),
-        "relative_tolerance": (
-            None if relative_tolerance is None else number("relative_tolerance", relative_tolerance)
-        ),
-        "rate": None if rate is None else whole("rate", rate),
-        "exact": flag("exact", exact),
-        "levels": whole("levels", levels),
-        "map_nan": None if map_nan is None else number("map_nan", map_nan),
-        "no_data": None if no_data is None else number("no_data", no_data),
-        "num_threads": whole("num_threads", num_threads),
-        # Where nothing bounds it, the error is measured: people ask.
-        "measure_error": not exact and tolerance is None and relative_tolerance is None,
-    }
-
-
-class TqdmProgress:
-    """A bar of tqdm's for each step."""
-
-    def __init__(self, tqdm: Any) -> None:
-        self.tqdm, self.bar, self.step = tqdm, None, ""
-
-    def __call__(self, what: str, done: float) -> None:
-        if what != self.step:
-            self.close()
-            self.step = what
-            self.bar = self.tqdm(total=100, desc=what, unit="%", leave=False)
-        if self.bar is not None:
-            self.bar.update(int(100 * done) - self.bar.n)
-
-    def close(self) -> None:
-        if self.bar is not None:
-            self.bar.close()
-
-
-def make_progress(progress: bool | Progress | None) -> Progress | None:
-    """None: a bar where tqdm is installed and somebody watches."""
-    if callable(progress):
-        return progress
-    if progress is not None:
-        flag("progress", progress)
-    in_notebook = "ipykernel" in sys.modules
-    if progress is False or (progress is None and not (sys.stderr.isatty() or in_notebook)):
-        return None
-    try:
-        from tqdm.auto import tqdm  # type: ignore[import-untyped,unused-ignore]
-    except ImportError:
-        return None
-    return TqdmProgress(tqdm)
-
-
-def compress(
-    array: Any,
-    *,
-    tolerance: float | None = None,
-    relative_tolerance: float | None = None,
-    rate: int | None = None,
-    exact: bool = False,
-    spacing: Sequence[float] | None = None,
-    origin: Sequence[float] | None = None,
-    direction: npt.ArrayLike | None = None,
-    levels: int = 1,
-    map_nan: float | None = None,
-    no_data: float | None = None,
-    fill_value: float | None = None,
-    path: str | os.PathLike[str] | None = None,
-    progress: bool | Progress | None = None,
-    num_threads: int = 0,
-) -> Volume:
-    """Compresses a three-dimensional array into memory, or into a file.
-
-    Arrays in chunked stores (dask, zarr, h5py, tensorstore, and xarray of these) are read a few
-    layers at a time, each chunk once; meanwhile a temporary file of the array's size keeps them,
-    unless voxels are float32 and nothing is given, or a rate is.
-
-    Parameters
-    ----------
-    array
-        Voxels, axes (z, y, x): numpy and what converts to it, memoryview, xarray, dask, zarr, h5py,
-        tensorstore, SimpleITK, itk, nibabel, pyvista.ImageData.
-    tolerance
-        No voxel is off by more [voxel values].
-    relative_tolerance
-        The same, as a part of the range of values.
-    rate
-        Bits per voxel, 1 to 32.
-    exact
-        Refuse voxels that float32 does not hold. Without tolerance, relative_tolerance and rate,
-        voxels keep all that float32 holds: integers below 2^24 and float32 have no error.
-    spacing, origin
-        World units between voxels, and position of voxel (0, 0, 0); each (z, y, x). What the array
-        says itself (xarray, SimpleITK...) where None, else 1 and 0.
-    direction
-        3 x 3; column a is the unit world direction (x, y, z) of index axis a, in the order x, y, z.
-    levels
-        Levels of detail, the volume itself among them; 0: all that it can have.
-    map_nan
-        What replaces NaN and infinite voxels.
-    no_data
-        Voxels of this value have no data, as NaN voxels have none: no surface touches them. It is
-        compared in the array's own type, and may be infinite; other infinite voxels are refused.
-        If None, what the array says itself: the attributes _FillValue or missing_value of xarray
-        and h5py, the fill value of zarr, h5py and tensorstore unless it is 0.
-    fill_value
-        What replaces masked values of masked arrays; if None, they have no data.
-    path
-        A .zfp file that the volume is written to, layer by layer, and opened from: then the result
-        need not fit into memory. None: into memory.
-    progress
-        True for a bar (needs tqdm), False for none, or a function of (what, done), done from 0 to
-        1. None: a bar on a terminal or in a notebook, where tqdm is installed.
-    num_threads
-        0: one per processor. The result is the same for any number.
-
-    Raises
-    ------
-    Error, TypeError, ValueError
-        What cannot be compressed, in one line.
-    """
-    source = as_source(
-        array,
-        spacing=spacing,
-        origin=origin,
-        direction=direction,
-        fill_value=fill_value,
-    )
-    if no_data is None:
-        no_data = source.no_data
-    options = compression_options(
-        tolerance, relative_tolerance, rate, exact, levels, map_nan, no_data, num_threads
-    )
-    nz, ny, nx = source.shape
-    columns: list[_core.Vector] = [column.tolist() for column in source.direction.T]
-    spacing_xyz, origin_xyz = reversed_axes(source.spacing), reversed_axes(source.origin)
-    grid = (str(source.dtype), (nx, ny, nz), spacing_xyz, origin_xyz, columns)
-    shown = make_progress(progress)
-    try:
-        if path is None and is_plain(array):
-            return Volume(_core.compress_array(array, *grid, options, shown))
-        keep = not isinstance(array, (np.ndarray, memoryview))  # these can be read again at no cost
-        file = None if path is None else os.path.abspath(os.fsdecode(path))
-        return Volume(_core.compress(source.read, *grid, options, keep, file, shown), file)
-    finally:
-        if isinstance(shown, TqdmProgress):
-            shown.close()
-
-
-def is_plain(array: Any) -> bool:
-    """Whether the compiled part can read its memory as it is."""
-    return (
-        type(array) is np.ndarray
-        and array.flags.c_contiguous
-        and array.dtype.isnative
-        and array.dtype.name in SUPPORTED_TYPES
-    )
-
-
-def open(  # noqa: A001: as gzip.open, h5py.File's habit
-    path: str | os.PathLike[str],
-    *,
-    tolerance: float | None = None,
-    relative_tolerance: float | None = None,
-    rate: int | None = None,
-    exact: bool = False,
-    shape: Sequence[int] | None = None,
-    dtype: npt.DTypeLike | None = None,
-    spacing: Sequence[float] | None = None,
-    levels: int = 1,
-    map_nan: float | None = None,
-    no_data: float | None = None,
-    progress: bool | Progress | None = None,
-    num_threads: int = 0,
-) -> Volume:
-    """Opens a volume.
-
-    A ``.zfp`` file stays where it is and is read when it is needed; it must not change. Others are
-    compressed into memory as compress() does: ``.raw`` and ``.raw.gz`` (named
-    ``NAME_XxYxZ_TYPE.raw``, or with shape (z, y, x) and dtype), ``.nrrd``, ``.nhdr``, ``.mha``,
-    ``.mhd``, ``.nii``, ``.nii.gz``, and ``generate:FIELD_XxYxZ_TYPE``.
-
-    spacing, (z, y, x), replaces that of the file.
-
-    Raises
-    ------
-    Error
-        The file is missing, broken or of another kind, in one line.
-    """
-    name = os.fsdecode(path)
-    is_compressed = name.endswith(".zfp")
-    options = compression_options(
-        tolerance, relative_tolerance, rate, exact, levels, map_nan, no_data, num_threads
-    )
-    if is_compressed:
-        options["measure_error"] = False
-    shown = make_progress(progress)
-    try:
-        core = _core.open(
-            name,
-            options,
-            None if shape is None else dims_of(shape),
-            None if dtype is None else np.dtype(dtype).name,
-            None if spacing is None else reversed_axes(spacing),
-            shown,
-        )
-    finally:
-        if isinstance(shown, TqdmProgress):
-            shown.close()
-    for notice in core.notices:
-        warnings.warn(notice, RuntimeWarning, stacklevel=2)
-    if not is_compressed:
-        return Volume(core)
-    return Volume(core, os.path.abspath(name), None if spacing is None else tuple(spacing))
-
-
-class Volume(Placed[_core.Volume]):
+class Volume(Voxels):
     """A compressed volume. It cannot be changed, and threads may share it.
 
     Made by compress() and open(). It is an array of float32, (z, y, x), that is decoded where it is
@@ -317,9 +68,6 @@ class Volume(Placed[_core.Volume]):
     the same file. A volume in memory is pickled with its compressed voxels.
     """
 
-    ndim = 3
-    dtype = Level.dtype  # of what indexing gives
-
     def __init__(
         self,
         core: _core.Volume,
@@ -327,127 +75,12 @@ class Volume(Placed[_core.Volume]):
         spacing: tuple[float, ...] | None = None,
     ) -> None:
         """file: the .zfp that has the voxels; spacing: what open() was given in place of its."""
-        self._core, self._file, self._file_spacing = core, file, spacing
-        self._token = uuid.uuid4().hex
+        super().__init__(core)
+        self._file, self._file_spacing = file, spacing
         self._lock = Turns()
         self._renderer: Renderer | None = None
         self._made_with: dict[str, Any] = {}
         self._host: _core.HostRenderer | None = None
-
-    @property
-    def size(self) -> int:
-        """Voxels."""
-        return self.levels[0].size
-
-    @property
-    def source_dtype(self) -> np.dtype[Any]:
-        """Of the voxels before compression."""
-        return np.dtype(self._core.source_type)
-
-    @property
-    def value_range(self) -> tuple[float, float]:
-        """Least and largest voxel before compression; infinite where a file does not say."""
-        least, largest = self._core.value_range
-        return least, largest
-
-    @property
-    def nbytes(self) -> int:
-        """Of the compressed voxels."""
-        return self._core.compressed_bytes
-
-    @property
-    def compression(self) -> str:
-        """How blocks are stored: "reversible" (all bits of float32), "whole numbers" (rounded to
-        the source's integers), "fixed accuracy" or "fixed rate"."""
-        return self._core.compression
-
-    @property
-    def bits_per_voxel(self) -> float:
-        return self._core.bits_per_voxel
-
-    @property
-    def max_error(self) -> float | None:
-        """Largest difference between a decoded voxel and the source; None: not measured."""
-        return self._core.max_voxel_error
-
-    @property
-    def errors_are_stated(self) -> bool:
-        """Whether errors and `value_range` are those that a .zfp file states.
-
-        The source is not there to check them: bounds of images hold if the file's writer is right.
-        False: they were measured when this volume was compressed.
-        """
-        return self._core.errors_are_stated
-
-    def isovalue_notice(self, isovalue: float) -> str:
-        """The warning that drawing this isovalue gives if it is outside the source's values, or
-        ""."""
-        return self._core.isovalue_notice(number("isovalue", isovalue))
-
-    @property
-    def num_levels(self) -> int:
-        """Levels of detail, the volume itself among them."""
-        return self._core.num_levels
-
-    def level_shape(self, level: int) -> tuple[int, int, int]:
-        """Voxels of a level along (z, y, x). Voxel k of it lies at voxel 2^level k of the volume.
-
-        Sides are halved, and one is added: a level may end up to a voxel of its own behind the
-        volume.
-        """
-        x, y, z = self._core.level_dims(self._checked(level))
-        return z, y, x
-
-    def _checked(self, level: int) -> int:
-        if isinstance(level, (bool, float, str)):
-            whole("level", level)
-        if not 0 <= level < self.num_levels:
-            raise ValueError(f"level {level} of a volume that has {self.num_levels}: from 0 on")
-        return level
-
-    @property
-    def levels(self) -> tuple[Level, ...]:
-        """The levels of detail as arrays, the volume itself first: volume.levels[2][5]."""
-        return tuple(Level(self, number) for number in range(self.num_levels))
-
-    def decode(self, level: int = 0, region: Any = ...) -> npt.NDArray[np.float32]:
-        """Voxels of a level of detail, float32, (z, y, x).
-
-        Parameters
-        ----------
-        level
-            Each has half the voxels of the last along each axis.
-        region
-            What one would index an array of the level with: numpy.s_[10:20, :, 5]. Only the blocks
-            of 4 x 4 x 4 voxels that hold these voxels are decoded.
-
-        Raises
-        ------
-        ValueError
-            There is no such level.
-        IndexError
-            The region is none of the level, in one line.
-        """
-        voxels: npt.NDArray[np.float32] = np.asarray(self.levels[self._checked(level)][region])
-        return voxels
-
-    def __len__(self) -> int:
-        return self.shape[0]
-
-    def __iter__(self) -> Iterator[npt.NDArray[np.float32]]:
-        return iter(self.levels[0])
-
-    def __getitem__(self, key: Any) -> Any:
-        return self.levels[0][key]
-
-    def __array__(
-        self, dtype: npt.DTypeLike | None = None, copy: bool | None = None
-    ) -> npt.NDArray[Any]:
-        return self.levels[0].__array__(dtype, copy)
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes a .zfp file, which open() and the program read; whole, or not at all."""
-        self._core.save(os.fsdecode(path))
 
     def __reduce__(self) -> tuple[Callable[..., Volume], tuple[Any, ...]]:
         if self._file is not None:
@@ -456,29 +89,6 @@ class Volume(Placed[_core.Volume]):
             path = pathlib.Path(folder, "volume.zfp")
             self.save(path)
             return from_bytes, (path.read_bytes(),)
-
-    def __copy__(self) -> Volume:
-        return self
-
-    def __deepcopy__(self, memo: object) -> Volume:
-        return self
-
-    def __dask_tokenize__(self) -> object:
-        """Whatever names dask's chunks of these voxels, and of no others."""
-        return self._token
-
-    def histogram(self, bins: int = 256) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]]:
-        """Counts [bins] and edges [bins + 1] of the values, as numpy.histogram gives them.
-
-        Of a large volume, of blocks that are spread over it: at most 2^24 voxels.
-        """
-        bins = whole("bins", bins)
-        values = self._core.sample(LARGEST_SAMPLE)
-        least, largest = self.value_range
-        if not np.isfinite([least, largest]).all():
-            least, largest = float(values.min()), float(values.max())
-        counts, edges = np.histogram(np.clip(values, least, largest), bins, (least, largest))
-        return counts.astype(np.int64), edges.astype(np.float64)
 
     def renderer(self, **options: Any) -> Renderer:
         """A Renderer of this volume; see there for the options."""
@@ -503,7 +113,7 @@ class Volume(Placed[_core.Volume]):
         camera: Camera | None = None,
         device: str | int | None = None,
         memory_budget: int | None = None,
-        **request: Any,
+        **more: Any,
     ) -> Image:
         """Draws the isosurface; Renderer.render has the other arguments.
 
@@ -523,16 +133,30 @@ class Volume(Placed[_core.Volume]):
         memory_budget
             Of device memory [bytes]; None: three quarters of it.
         """
-        wanted = {"device": device, "memory_budget": memory_budget, "size": size_of(size)}
+        request = Request(isovalue, camera, size, **more)
+        return self.draw(request, device=device, memory_budget=memory_budget)
+
+    def draw(
+        self,
+        request: Request,
+        *,
+        device: str | int | None = None,
+        memory_budget: int | None = None,
+    ) -> Image:
+        """Draws a frame with a size, as render()."""
+        wanted: dict[str, Any] = {"device": device, "memory_budget": memory_budget}
+        wanted |= {"size": request.size, **dict.fromkeys(request.needs, True)}
+        wanted["levels"] = not {"levels", "bounds", "time_budget"}.isdisjoint(request.needs)
+        if request.samples != 1:
+            wanted["samples"] = request.samples
         with self._lock:
-            renderer = self._renderer_for({**wanted, **needed_options(request)})
-            return renderer.render(isovalue, size=size, camera=camera, **request)
+            return self._renderer_for(wanted).draw(request)
 
     def _renderer_for(self, wanted: dict[str, Any]) -> Renderer:
         """The kept renderer, or a new one where it lacks what is wanted."""
         made = self._made_with
         size = wanted.pop("size", (0, 0))
-        samples = whole("samples", wanted.get("samples", 1))
+        samples = wanted.get("samples", 1)
         fits = (
             self._renderer is not None
             and size[0] * size[1] * samples**2 <= self._renderer.max_rays
@@ -615,7 +239,7 @@ class Volume(Placed[_core.Volume]):
         vertices: str = "apart",
         device: str | int | None = None,
         memory_budget: int | None = None,
-        progress: Progress | None = None,
+        progress: Callable[[str, float], object] | None = None,
     ) -> Mesh:
         """The isosurface as triangles, by marching cubes on the device.
 
@@ -673,12 +297,13 @@ class Volume(Placed[_core.Volume]):
             equal: whether all are the same; differing_pixels, differing_depths, differing_normals:
             how many are not; hits: rays that hit something.
         """
+        request = Request(isovalue, camera, size)
         with self._lock:
-            renderer = self._renderer_for({"device": device, "size": size_of(size)})
+            renderer = self._renderer_for({"device": device, "size": request.size})
             renderer.wait()
-            image = renderer.render(isovalue, size=size, camera=camera)
+            image = renderer.draw(request)
             host = self._host_renderer()
-        twin = draw(host, request_for(isovalue, image.camera, size))
+        twin = draw(host, replace(request, camera=image.camera))
         assert image.rgb is not None and image.depth is not None and image.normals is not None
         differing = {
             "differing_pixels": int((image.rgb != twin["picture"]).any(axis=-1).sum()),
@@ -695,35 +320,16 @@ class Volume(Placed[_core.Volume]):
 
     def view(self, **options: Any) -> Any:
         """Shows the volume in a notebook's widget or a browser's tab: isowave.view()."""
-        return view(self, **options)
-
-    def __repr__(self) -> str:
-        shape = " x ".join(str(n) for n in self.shape)
-        return (
-            f"<isowave.Volume {shape} (z, y, x) {self.source_dtype}, "
-            f"{self.nbytes / 2**20:.1f} MiB, {self.bits_per_voxel:.2f} bits a voxel>"
-        )
-
-    def _repr_html_(self) -> str:
-        least, largest = self.value_range
-        rows = {
-            "shape (z, y, x)": " x ".join(str(n) for n in self.shape),
-            "spacing": ", ".join(f"{s:g}" for s in self.spacing),
-            "values": f"{self.source_dtype}, {least:g} to {largest:g}",
-            "compressed": f"{self.nbytes / 2**20:.1f} MiB, {self.bits_per_voxel:.2f} bits a voxel",
-            "largest error": "not known" if self.max_error is None else f"{self.max_error:.3g}",
-            "levels of detail": str(self.num_levels),
-        }
-        cells = "".join(
-            f"<tr><th style='text-align:left'>{html.escape(name)}</th><td>{html.escape(text)}</td>"
-            for name, text in rows.items()
-        )
-        return f"<table>{cells}</table>"
+        return viewer.view(self, **options)
 
 
 def open_again(path: str, spacing: tuple[float, ...] | None) -> Volume:
     """A pickled volume of a file."""
-    return open(path, spacing=spacing)
+    core = _core.open(
+        path, {}, None, None, None if spacing is None else reversed_axes(spacing), None
+    )
+    warn_of_file(core)
+    return Volume(core, path, spacing)
 
 
 def from_bytes(data: bytes) -> Volume:
@@ -734,12 +340,7 @@ def from_bytes(data: bytes) -> Volume:
         return Volume(_core.open(path, {}, None, None, None, None))
 
 
-def view(volume: Volume, **options: Any) -> Any:
-    """Shows a volume: in a notebook as a widget, else in a tab of the browser.
-
-    Needs `pip install isowave[view]`, in notebooks `isowave[notebook]`. isowave.viewer has the
-    options.
-    """
-    from isowave import viewer
-
-    return viewer.view(volume, **options)
+def warn_of_file(core: _core.Volume) -> None:
+    """Tells the caller's caller what is strange about a volume's file."""
+    for notice in core.notices:
+        warnings.warn(notice, RuntimeWarning, stacklevel=3)

@@ -17,10 +17,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from isowave._camera import Camera, vector
+from isowave._compress import open
 from isowave._core import Error
+from isowave._image import Image
 from isowave._levels import Level, split_key
-from isowave._renderer import Camera, Image, vector
-from isowave._volume import Volume, open
+from isowave._volume import Volume
 
 #: What is sure to fit into a texture: 512 MiB of float32.
 LARGEST_TEXTURE = 1 << 27

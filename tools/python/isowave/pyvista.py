@@ -17,10 +17,10 @@ pixel by pixel; translucent meshes are blended over it.
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import warnings
 import weakref
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -31,7 +31,9 @@ from vtkmodules.vtkCommonCore import vtkPoints
 from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkImageData, vtkPolyData
 from vtkmodules.vtkRenderingCore import vtkPolyDataMapper, vtkTexture
 
-from isowave._renderer import Camera, Color, Image, color_of, is_smooth, vector
+from isowave._camera import Camera, vector
+from isowave._image import Image
+from isowave._request import Color, Request
 from isowave._volume import Volume
 
 __all__ = ["Isosurface", "add_isosurface", "screenshot"]
@@ -68,7 +70,6 @@ FRAGMENT = {
     "Light::Impl": "  gl_FragData[0] = vec4(isowavePixel.rgb, 1.0);\n",
 }
 
-Request = dict[str, Any]
 surfaces_of: weakref.WeakKeyDictionary[Any, list[Isosurface]] = weakref.WeakKeyDictionary()
 
 
@@ -79,15 +80,15 @@ class Isosurface:
     """
 
     def __init__(
-        self, plotter: Any, volume: Volume, isovalue: float, color: Color | None, request: Request
+        self, plotter: Any, volume: Volume, request: Request, **renderer_options: Any
     ) -> None:
         self.volume = volume
-        self.isovalue = isovalue  #: the surface is where the trilinear field crosses this value
-        self.color = color
+        self.isovalue = request.isovalue  #: the surface is where the field crosses this value
+        self.color = request.color
         self.image: Image | None = None  #: the last picture, with "rgb" and "depth"
         self.error: Exception | None = None  #: why the last frame was drawn without the surface
         self._failure: Exception | None = None  # the same, of any frame since screenshot() began
-        self._request = request
+        self._request, self._renderer_options = request, renderer_options
         self._drawn: tuple[Any, ...] | None = None
         self._plotter = weakref.ref(plotter)
         self._renderer = weakref.ref(plotter.renderer)
@@ -128,14 +129,14 @@ class Isosurface:
                 raise ValueError("isosurfaces cannot be scaled or moved with the scene")
             wanted = (self.isovalue, self.color, view)
             if wanted != self._drawn:
-                self.image = self.volume.render(
-                    self.isovalue,
-                    size=view.size,
+                request = replace(
+                    self._request,
+                    isovalue=self.isovalue,
                     camera=view.camera,
+                    size=view.size,
                     color=self.color,
-                    outputs=("rgb", "depth"),
-                    **self._request,
                 )
+                self.image = self.volume.draw(request, **self._renderer_options)
                 (left, bottom), (width, height) = view.corner, view.part
                 frame = frame_of(self.image)
                 self._show(frame[bottom : bottom + height, left : left + width])
@@ -208,12 +209,15 @@ def add_isosurface(
     """
     if plotter.renderer.GetActiveCamera().GetParallelProjection():
         raise ValueError(PARALLEL)
-    is_smooth(normals)
-    if color is not None:
-        color_of(color)
-    request = {"device": device, "memory_budget": memory_budget, "max_error": max_error}
-    request |= {"voxel_pixels": voxel_pixels, "normals": normals}
-    surface = Isosurface(plotter, volume, float(isovalue), color, request)
+    request = Request(
+        isovalue,
+        color=color,
+        normals=normals,
+        outputs=("rgb", "depth"),
+        max_error=max_error,
+        voxel_pixels=voxel_pixels,
+    )
+    surface = Isosurface(plotter, volume, request, device=device, memory_budget=memory_budget)
     plotter.add_actor(surface.actor, reset_camera=reset_camera, pickable=False, render=False)
     surfaces_of.setdefault(plotter, []).append(surface)
     return surface
@@ -237,7 +241,7 @@ def screenshot(plotter: pyvista.Plotter, **options: Any) -> npt.NDArray[np.uint8
     return np.asarray(rgb)
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclass(frozen=True)
 class View:
     """What a vtkRenderer shows: a part of a picture whose middle the camera looks at.
 

@@ -50,7 +50,7 @@ def fails(name, work):
     text = None
     try:
         work()
-    except (isowave.Error, ValueError) as error:
+    except (isowave.Error, TypeError, ValueError) as error:
         text = str(error)
     errors[name] = comm.allgather(text)
 
@@ -59,6 +59,7 @@ fails("isovalue", lambda: renderer.render(40 + rank))
 fails("camera", lambda: renderer.render(40, camera=camera if rank == 1 else None))
 fails("color", lambda: renderer.render(40, color="blue" if rank == 1 else None))
 fails("outputs", lambda: renderer.render(40, outputs=("position",)))
+fails("time", lambda: renderer.render(40, time_budget=1.0))
 fails("max_error", lambda: renderer.render(40, max_error=1.0))
 fails("no error", lambda: bounded.render(40, max_error=0.0))
 fails("too large", lambda: renderer.render(40, size=(960, 640)))

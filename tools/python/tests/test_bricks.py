@@ -93,6 +93,7 @@ def test_bounds_of_the_error(drawn, levelled):
         ("camera", "some processes give a camera"),
         ("color", "color 'blue': give '#rrggbb'"),
         ("outputs", "outputs position: bricks have rgb, depth, normals, bounds"),
+        ("time", "a BrickRenderer draws without time_budget"),
         ("max_error", "made with_bounds"),
         ("no error", "an error of 0 pixels cannot be kept"),
         ("too large", "960"),

@@ -22,9 +22,10 @@ from typing import Any
 import numpy as np
 import pytest
 from PIL import Image
-from viewer_fakes import FakeCamera, FakeVolume
+from viewer_fakes import FakeVolume
 
-from isowave import viewer
+from isowave import Camera, viewer
+from isowave._request import Request
 from isowave.viewer.scene import Scene
 from isowave.viewer.server import Server
 
@@ -61,7 +62,6 @@ def fake_scene(volume: FakeVolume, title: str = "ball.nrrd", **options: Any) -> 
         volume,
         isovalue=80,
         title=title,
-        make_camera=lambda v: FakeCamera(v.eye, v.at, v.up, v.fovy),
         **options,
     )
 
@@ -269,19 +269,10 @@ def test_the_picture_is_the_renderers(page: Any, server: Server) -> None:
     renderer = volume.renderer(device=None, size=shot.size, samples=1)
     names = ("eye", "at", "up")
     vectors: list[Any] = [tuple(float(x) for x in state(page)[k].split(",")) for k in names]
-    expected = renderer.render(
-        80.0,
-        camera=FakeCamera(*vectors, float(state(page)["fovy"])),
-        size=shot.size,
-        samples=1,
-        color=(0xDB / 255, 0xBD / 255, 0x87 / 255),
-        background=(1, 1, 1),
-        outputs=("rgb",),
-        max_error=None,
-        time_budget=None,
-        ambient=0,
-        on_pass=lambda image: True,
-    )
+    camera = Camera(*vectors, float(state(page)["fovy"]))
+    color = (0xDB / 255, 0xBD / 255, 0x87 / 255)
+    request = Request(80.0, camera, shot.size, color=color, background=(1, 1, 1))
+    expected = renderer.draw(request)
     difference = np.asarray(shot).astype(int) - expected.rgb
     # The URL keeps nine digits of the camera: a ray in a million may cross a border of the ball.
     assert np.count_nonzero(np.abs(difference).max(axis=2) > 1) <= 3
@@ -765,7 +756,7 @@ def test_a_budget_that_is_too_small_says_what_would_do(open_page: Callable[..., 
 
 def test_an_error_of_the_renderer_is_shown_and_passes(open_page: Callable[..., Any]) -> None:
     def before_pass(drawn: Any) -> None:
-        if drawn.isovalue == 13:
+        if drawn.request.isovalue == 13:
             raise RuntimeError("the device was lost")
 
     with Server(fake_scene(FakeVolume(before_pass=before_pass))) as server:

@@ -13,6 +13,7 @@ from conftest import sphere_voxels
 from PIL import Image
 
 import isowave
+from isowave._request import Request
 from isowave.viewer.host import make_host
 from isowave.viewer.scene import Scene, Session
 
@@ -104,19 +105,16 @@ def test_the_host_draws_the_devices_bits(volume: isowave.Volume) -> None:
     pictures = []
     for renderer in renderers:
         assert renderer is not None
-        image = renderer.render(
+        camera = renderer.camera(8.5, (90, 70))
+        request = Request(
             8.5,
-            camera=renderer.camera(8.5, (90, 70)),
-            size=(90, 70),
-            samples=1,
+            camera,
+            (90, 70),
             color=(0.5, 0.25, 1),
             background=(1, 1, 0),
-            outputs=("rgb",),
-            max_error=None,
-            time_budget=None,
-            ambient=0,
             on_pass=lambda so_far: so_far.completed_percent <= 100,
         )
+        image = renderer.draw(request)
         assert image.complete and image.statistics["passes"] > 0
         pictures.append(image.rgb)
     np.testing.assert_array_equal(*pictures)

@@ -10,9 +10,11 @@ import random
 from typing import Any
 
 import pytest
-from viewer_fakes import FakeCamera, FakeVolume
+from viewer_fakes import FakeVolume
 
-from isowave.viewer.protocol import Ack, Budget, Hello, ProtocolError, View, Wish, check, parse
+from isowave import Camera
+from isowave._request import Request
+from isowave.viewer.protocol import Ack, Budget, Hello, ProtocolError, Wish, check, parse
 from isowave.viewer.scene import Scene, Session
 
 CAMERA = {"eye": [0, 0, 5], "at": [0, 0, 0], "up": [0, 1, 0], "fovy_deg": 60}
@@ -36,9 +38,12 @@ def test_messages_are_read() -> None:
     assert check({"type": "ack", "frame": 3}) == Ack(3)
     assert check({"type": "budget", "bytes": None}) == Budget(None)
     assert check({"type": "budget", "bytes": 5}) == Budget(5)
-    view = View((0, 0, 5), (0, 0, 0), (0, 1, 0), 60)
-    wish = Wish(7, 80, (64, 48), view, (1, 0.5, 0), (1, 1, 1), 2, 0.5, None, 16)
-    assert check(parse(json.dumps(WISH))) == wish
+    camera = Camera((0, 0, 5), (0, 0, 0), (0, 1, 0), 60)
+    colors: dict[str, Any] = {"color": (1, 0.5, 0), "background": (1, 1, 1), "outputs": ("rgb",)}
+    asked = Request(80, camera, (64, 48), 2, **colors, max_error=0.5, ambient=16)
+    assert check(parse(json.dumps(WISH))) == Wish(7, asked)
+    timed = check({**WISH, "max_error": None, "time_budget": 50})
+    assert isinstance(timed, Wish) and timed.request.time_budget == 0.05  # ms to seconds
 
 
 BAD_WISHES: list[tuple[dict[str, Any], str]] = [
@@ -178,7 +183,6 @@ def test_fuzz() -> None:
         size=(16, 16),
         clock=lambda: next(ticks) * 0.1,
         start=False,
-        make_camera=lambda v: FakeCamera(v.eye, v.at, v.up, v.fovy),
     )
     sent: list[dict[str, Any]] = []
 

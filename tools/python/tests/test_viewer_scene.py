@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import io
 import threading
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from PIL import Image
-from viewer_fakes import Drawn, FakeCamera, FakeVolume
+from viewer_fakes import Drawn, FakeVolume
 
+from isowave import Camera
+from isowave._request import Request
 from isowave.viewer.pictures import Extent, Stopped, count_rays, dividing_value, encode_png
 from isowave.viewer.pictures import fit_size, share_within
-from isowave.viewer.protocol import Ack, Budget, ProtocolError, TokenBucket, View, Wish
+from isowave.viewer.protocol import Ack, Budget, ProtocolError, TokenBucket, Wish
 from isowave.viewer.scene import GIVE_BACK_SECONDS, MAX_CAMERA_RAYS, TURN_SECONDS
 from isowave.viewer.scene import Client, Scene, Session, Stage
 
@@ -26,8 +29,11 @@ class Clock:
         return self.now
 
 
-def fake_camera(view: View) -> FakeCamera:
-    return FakeCamera(view.eye, view.at, view.up, view.fovy)
+def wish_of(
+    wish_id: int, isovalue: float = 80.0, size: tuple[int, int] = (32, 32), **more: Any
+) -> Wish:
+    colors: dict[str, Any] = {"color": (1, 0.5, 0), "background": (1, 1, 1)}
+    return Wish(wish_id, Request(isovalue, size=size, outputs=("rgb",), **colors | more))
 
 
 class Eye:
@@ -48,10 +54,7 @@ class Eye:
 
     def wish(self, isovalue: float = 80.0, size: tuple[int, int] = (64, 48), **more: Any) -> int:
         self.wishes += 1
-        fields = dict(view=None, color=(1, 0.5, 0), background=(1, 1, 1), samples=1)
-        fields |= dict(max_error=None, time_budget=None, ambient=0) | more
-        wish = Wish(id=self.wishes, isovalue=isovalue, size=size, **fields)  # type: ignore
-        self.scene.receive(self.client, wish)
+        self.scene.receive(self.client, wish_of(self.wishes, isovalue, size, **more))
         return self.wishes
 
     def stage_done(self) -> bool:
@@ -73,7 +76,7 @@ class Eye:
 
 def make_scene(volume: FakeVolume, clock: Clock, **options: Any) -> Scene:
     options = dict(isovalue=80.0, size=(640, 480)) | options
-    scene = Scene(volume, clock=clock, start=False, make_camera=fake_camera, **options)
+    scene = Scene(volume, clock=clock, start=False, **options)
     scene.step()  # prepares
     scene.step()  # makes the renderer
     return scene
@@ -112,7 +115,7 @@ def test_a_wish_is_drawn_small_then_whole_then_lossless() -> None:
     run(scene)
     assert len(eye.pictures) == 3
     assert volume.frames[-1].size == (16, 12)
-    assert volume.frames[-1].outputs == ("depth", "bounds")
+    assert volume.frames[-1].request.outputs == ("depth", "bounds")
     # A pixel of the whole picture is a quarter of one of the first picture.
     assert [h["within_pixel"] for h in eye.of_type("bounds")] == [pytest.approx(2 / 3)]
     assert not eye.of_type("bounds")[0]["errors_are_stated"]
@@ -154,19 +157,8 @@ def test_the_last_picture_is_lossless_to_the_bit() -> None:
     run(scene)
     drawn = volume.frames[-1]
     renderer = volume.renderer(device=None, size=(64, 48), samples=1)
-    expected = renderer.render(
-        80.0,
-        camera=drawn.camera,
-        size=(64, 48),
-        samples=1,
-        color=(1, 0.5, 0),
-        background=(1, 1, 1),
-        outputs=("rgb",),
-        max_error=None,
-        time_budget=None,
-        ambient=0,
-        on_pass=lambda image: True,
-    )
+    wish = wish_of(1, size=(64, 48)).request
+    expected = renderer.draw(replace(wish, camera=drawn.request.camera))
     png = Image.open(io.BytesIO(eye.data[max(eye.data)]))
     assert png.format == "PNG"
     np.testing.assert_array_equal(np.asarray(png), expected.rgb)
@@ -181,15 +173,15 @@ def test_the_newest_wish_cancels_the_frame_at_hand(stage_size: tuple[int, int]) 
     eye = Eye(scene)
 
     def before_pass(drawn: Drawn) -> None:
-        if drawn.size == stage_size and drawn.isovalue == 80 and drawn.passes == 2:
+        if drawn.size == stage_size and drawn.request.isovalue == 80 and drawn.passes == 2:
             eye.wish(90.0)
 
     volume.before_pass = before_pass
     eye.wish(80.0)
     run(scene)
     cancelled = [f for f in volume.frames if f.stopped]
-    assert [(f.isovalue, f.size, f.passes) for f in cancelled] == [(80.0, stage_size, 3)]
-    assert [f.isovalue for f in volume.frames][-2:] == [90.0, 90.0]
+    assert [(f.request.isovalue, f.size, f.passes) for f in cancelled] == [(80.0, stage_size, 3)]
+    assert [f.request.isovalue for f in volume.frames][-2:] == [90.0, 90.0]
     # Nothing of the old wish after the new one's first picture.
     wishes = [wish for wish, _ in eye.pictures]
     assert wishes == sorted(wishes)
@@ -211,7 +203,7 @@ def test_wishes_that_come_faster_than_first_pictures_still_show_something() -> N
     run(scene)
     partial = [wish for wish, stage in eye.pictures if stage == "pass" and wish < 20]
     assert partial == list(range(1, 20))  # each was drawn for 0.18 s
-    assert all(f.stopped for f in volume.frames if f.isovalue < 99)
+    assert all(f.stopped for f in volume.frames if f.request.isovalue < 99)
 
 
 def test_two_pictures_are_on_the_way_and_the_last_is_sent_on_the_ack() -> None:
@@ -262,7 +254,7 @@ def test_clients_take_turns() -> None:
 
     def before_pass(drawn: Drawn) -> None:
         # One client wishes all the time; the others get their pictures nevertheless.
-        if drawn.isovalue == 1.0 and greedy.wishes < 30:
+        if drawn.request.isovalue == 1.0 and greedy.wishes < 30:
             greedy.wish(1.0)
             greedy.ack()
 
@@ -272,7 +264,7 @@ def test_clients_take_turns() -> None:
     for _ in range(12):
         scene.step()
         clock.now += 0.04
-    order = [f.isovalue for f in volume.frames]
+    order = [f.request.isovalue for f in volume.frames]
     assert order[:3] == [1.0, 2.0, 3.0] and sorted(order[3:6]) == [1.0, 2.0, 3.0]
     for eye in eyes[1:]:
         assert eye.pictures[:2] == [(1, "first"), (1, "whole")]
@@ -297,15 +289,15 @@ def test_a_long_whole_picture_gives_way_once_to_a_first_picture() -> None:
     slow, quick = Eye(scene), Eye(scene)
 
     def before_pass(drawn: Drawn) -> None:
-        clock.now += 0.1 if drawn.isovalue == 1.0 and drawn.size == (64, 48) else 0.0
-        if drawn.isovalue == 1.0 and drawn.size == (64, 48) and drawn.passes == 3:
+        clock.now += 0.1 if drawn.request.isovalue == 1.0 and drawn.size == (64, 48) else 0.0
+        if drawn.request.isovalue == 1.0 and drawn.size == (64, 48) and drawn.passes == 3:
             if not quick.wishes:
                 quick.wish(2.0)
 
     volume.before_pass = before_pass
     slow.wish(1.0)
     run(scene)
-    frames = [(f.isovalue, f.size[0], f.stopped) for f in volume.frames]
+    frames = [(f.request.isovalue, f.size[0], f.stopped) for f in volume.frames]
     assert frames == [
         (1.0, 16, False),
         (1.0, 64, True),
@@ -330,7 +322,7 @@ def test_small_pictures_of_others_come_in_bounded_time_and_the_large_one_in_the_
         if drawn.size == (96, 72) and quick.stage_done() and quick.wishes < 12:
             asked = clock.now
             quick.wish(2.0, size=(64, 48))
-        if drawn.isovalue == 2.0 and drawn.size == (64, 48) and drawn.passes == 199:
+        if drawn.request.isovalue == 2.0 and drawn.size == (64, 48) and drawn.passes == 199:
             waits.append(clock.now - asked)
 
     volume.before_pass = before_pass
@@ -385,13 +377,15 @@ def test_a_new_wish_cancels_a_frame_with_a_time_budget() -> None:
     eye = Eye(scene)
 
     def before_pass(frame: Drawn) -> None:
-        if frame.isovalue == 80.0 and frame.passes == 1:
-            eye.wish(81.0, time_budget=50.0)
+        if frame.request.isovalue == 80.0 and frame.passes == 1:
+            eye.wish(81.0, time_budget=0.05)
 
     volume.before_pass = before_pass
-    eye.wish(80.0, time_budget=50.0)
+    eye.wish(80.0, time_budget=0.05)
     run(scene)
-    stopped = [(f.isovalue, f.stopped) for f in volume.frames if f.time_budget is not None]
+    stopped = [
+        (f.request.isovalue, f.stopped) for f in volume.frames if f.request.time_budget is not None
+    ]
     assert stopped == [(80.0, True), (81.0, False)]
 
 
@@ -411,13 +405,18 @@ def test_a_time_budget_needs_no_first_picture() -> None:
     clock, volume = Clock(), FakeVolume()
     scene = make_scene(volume, clock)
     eye = Eye(scene)
-    eye.wish(80.0, time_budget=50.0)
+    eye.wish(80.0, time_budget=0.05)
     run(scene)
-    assert [(f.size, f.time_budget, f.max_error) for f in volume.frames] == [((64, 48), 0.05, None)]
+    assert [(f.size, f.request.time_budget, f.request.max_error) for f in volume.frames] == [
+        ((64, 48), 0.05, None)
+    ]
     eye.ack()
     eye.wish(80.0, max_error=0.5)
     run(scene)
-    assert (volume.frames[-1].time_budget, volume.frames[-1].max_error) == (None, 0.5)
+    assert (volume.frames[-1].request.time_budget, volume.frames[-1].request.max_error) == (
+        None,
+        0.5,
+    )
 
 
 def test_the_surface_fills_the_picture_where_no_camera_is_given() -> None:
@@ -427,17 +426,17 @@ def test_the_surface_fills_the_picture_where_no_camera_is_given() -> None:
     eye.wish(80.0, size=(64, 48))
     run(scene)
     home = volume.renderer(device=None, size=(64, 48), samples=1).camera(80.0, (64, 48))
-    assert volume.frames[0].camera == home == volume.frames[1].camera
+    assert volume.frames[0].request.camera == home == volume.frames[1].request.camera
     assert eye.of_type("picture")[0]["camera"]["eye"] == list(home.eye)
     eye.ack()
     eye.wish(80.0, size=(32, 64))  # narrow: further away
     run(scene)
-    assert volume.frames[-1].camera.eye[2] > home.eye[2] + 1
+    assert volume.frames[-1].request.camera.eye[2] > home.eye[2] + 1
     eye.ack()
-    view = View((1, 2, 3), (0, 0, 0), (0, 1, 0), 30.0)
-    eye.wish(80.0, view=view)
+    view = Camera((1, 2, 3), (0, 0, 0), (0, 1, 0), 30.0)
+    eye.wish(80.0, camera=view)
     run(scene)
-    assert volume.frames[-1].camera == FakeCamera((1, 2, 3), (0, 0, 0), (0, 1, 0), 30.0)
+    assert volume.frames[-1].request.camera == Camera((1, 2, 3), (0, 0, 0), (0, 1, 0), 30.0)
 
 
 def test_an_error_of_the_renderer_concerns_one_client() -> None:
@@ -446,7 +445,7 @@ def test_an_error_of_the_renderer_concerns_one_client() -> None:
     bad, good = Eye(scene), Eye(scene)
 
     def before_pass(drawn: Drawn) -> None:
-        if drawn.isovalue == 13.0:
+        if drawn.request.isovalue == 13.0:
             raise RuntimeError("unlucky\nand long")
 
     volume.before_pass = before_pass
@@ -532,24 +531,20 @@ def test_the_host_draws_while_the_device_is_prepared(works: bool) -> None:
 
     volume = FakeVolume(refuse=refuse)
     host = FakeVolume().renderer(device="host", size=(64, 48), samples=1)
-    scene = Scene(
-        volume, isovalue=80, size=(64, 48), make_camera=fake_camera, make_host=lambda v: host
-    )
+    scene = Scene(volume, isovalue=80, size=(64, 48), make_host=lambda v: host)
     client = scene.join(post)
     assert client is not None
-    wish = dict(isovalue=80.0, size=(32, 32), view=None, color=(1, 1, 1), background=(0, 0, 0))
-    more: dict[str, Any] = dict(wish, samples=1, max_error=None, time_budget=None, ambient=0)
-    scene.receive(client, Wish(id=1, **more))
+    scene.receive(client, wish_of(1))
     assert came(stage="lossless", wish=1)
     assert not [h for h in heads if h.get("state") in ("ready", "failed")] and not volume.frames
     may_begin.set()
     if works:
         # The pictures have the same bits: only what the host does not know is drawn again.
         assert came(type="bounds", wish=1)
-        assert [f.outputs for f in volume.frames] == [("depth", "bounds")]
+        assert [f.request.outputs for f in volume.frames] == [("depth", "bounds")]
     else:
         assert came(type="error", message="no device")
-        scene.receive(client, Wish(id=2, **more))
+        scene.receive(client, wish_of(2))
         assert came(type="error", message="no device", wish=2)
     scene.close()
 
@@ -585,7 +580,7 @@ def test_a_renderer_grows_with_the_pictures() -> None:
     eye.wish(size=(64, 48), samples=2)
     run(scene)
     assert [(r["size"], r["samples"]) for r in volume.renderers] == [((64, 48), 1), ((64, 48), 2)]
-    assert (volume.frames[-1].size, volume.frames[-1].samples) == ((64, 48), 2)
+    assert (volume.frames[-1].size, volume.frames[-1].request.samples) == ((64, 48), 2)
 
 
 def test_a_renderer_that_cannot_grow_draws_smaller_pictures() -> None:
@@ -601,7 +596,7 @@ def test_a_renderer_that_cannot_grow_draws_smaller_pictures() -> None:
     eye.wish(size=(64, 48), samples=2)
     run(scene)
     assert len(volume.renderers) == 3  # the first, the one too large, the first again
-    assert (volume.frames[-1].size, volume.frames[-1].samples) == ((32, 24), 2)
+    assert (volume.frames[-1].size, volume.frames[-1].request.samples) == ((32, 24), 2)
     assert eye.of_type("picture")[-1]["reduced"] == (
         "The device has no memory for more: this picture has 32 x 24 pixels, 4 rays a pixel, "
         "0 ambient rays."
@@ -626,12 +621,12 @@ def test_whole_pictures_have_ambient_rays_and_a_renderer_for_them() -> None:
     eye.wish(size=(64, 48), ambient=16)
     run(scene)
     assert [r["rays"] for r in volume.renderers] == [False, True]
-    drawn = [(frame.size, frame.ambient) for frame in volume.frames]
+    drawn = [(frame.size, frame.request.ambient) for frame in volume.frames]
     assert drawn == [((16, 12), 0), ((64, 48), 16)], "none in the first picture"
     eye.ack()
     eye.wish(81.0, size=(64, 48))
     run(scene)
-    assert volume.frames[-1].ambient == 0 and len(volume.renderers) == 2
+    assert volume.frames[-1].request.ambient == 0 and len(volume.renderers) == 2
 
 
 def test_without_memory_for_ambient_rays_pictures_have_none() -> None:
@@ -645,7 +640,7 @@ def test_without_memory_for_ambient_rays_pictures_have_none() -> None:
         eye.wish(isovalue, size=(64, 48), ambient=16)
         run(scene)
         eye.ack()
-        assert volume.frames[-1].ambient == 0
+        assert volume.frames[-1].request.ambient == 0
     assert [r["rays"] for r in volume.renderers] == [False, True, False], "not tried again"
     scene.receive(eye.client, Budget(1 << 30))
     eye.wish(82.0, size=(64, 48), ambient=16)
@@ -677,16 +672,16 @@ def test_no_picture_has_more_rays_than_the_server_allows(wish: dict[str, Any]) -
     run(scene)
     assert eye.of_type("picture")[-1]["stage"] == "lossless" and not eye.of_type("error")
     for frame in volume.frames:
-        rays = frame.size[0] * frame.size[1] * frame.samples**2
-        assert 0 < rays * (1 + frame.ambient) <= limit
+        rays = frame.size[0] * frame.size[1] * frame.request.samples**2
+        assert 0 < rays * (1 + frame.request.ambient) <= limit
     for made in volume.renderers:
         assert made["size"][0] * made["size"][1] * made["samples"] ** 2 <= limit
     for head in eye.of_type("picture")[-2:]:
-        drawn = next(f for f in reversed(volume.frames) if f.outputs == ("rgb",))
-        assert (head["size"], head["ambient"]) == (list(drawn.size), drawn.ambient)
+        drawn = next(f for f in reversed(volume.frames) if f.request.outputs == ("rgb",))
+        assert (head["size"], head["ambient"]) == (list(drawn.size), drawn.request.ambient)
         assert head["reduced"].startswith("The server draws at most 20,000 rays, 20,000 from")
         assert f"{drawn.size[0]} x {drawn.size[1]} pixels" in head["reduced"]
-        assert f", {drawn.ambient} ambient ray" in head["reduced"]
+        assert f", {drawn.request.ambient} ambient ray" in head["reduced"]
 
 
 def test_pictures_within_the_limits_are_drawn_as_they_are() -> None:
@@ -695,7 +690,7 @@ def test_pictures_within_the_limits_are_drawn_as_they_are() -> None:
     eye = Eye(scene)
     eye.wish(samples=2, ambient=16)
     run(scene)
-    assert (volume.frames[-1].samples, volume.frames[-1].ambient) == (2, 16)
+    assert (volume.frames[-1].request.samples, volume.frames[-1].request.ambient) == (2, 16)
     assert all(head["reduced"] is None for head in eye.of_type("picture"))
 
 
@@ -795,7 +790,7 @@ def test_closing_does_not_wait_for_a_long_pass_or_compilation(what: str) -> None
         assert may_end.wait(60)
 
     volume = FakeVolume(**{what: hold})  # type: ignore[arg-type]
-    scene = Scene(volume, isovalue=80, make_camera=fake_camera, make_host=lambda v: None)
+    scene = Scene(volume, isovalue=80, make_host=lambda v: None)
     Eye(scene).wish()
     assert began.wait(60)
     scene.close()  # returns although the pass or the compilation does not end before
@@ -822,15 +817,13 @@ def test_others_get_pictures_while_a_larger_renderer_is_made() -> None:
 
     volume = FakeVolume(refuse=refuse)
     host = FakeVolume().renderer(device="host", size=(64, 48), samples=1, rays=True)
-    scene = Scene(volume, isovalue=80, make_camera=fake_camera, make_host=lambda v: host)
-    fields: Any = dict(id=1, isovalue=80.0, size=(32, 32), view=None, color=(1, 1, 1), samples=1)
-    fields |= dict(background=(0, 0, 0), max_error=None, time_budget=None, ambient=0)
+    scene = Scene(volume, isovalue=80, make_host=lambda v: host)
     large, other = scene.join(lambda head, data: None), scene.join(post)
     assert large is not None and other is not None
-    scene.receive(large, Wish(**{**fields, "ambient": 8}))
+    scene.receive(large, wish_of(1, ambient=8))
     with changed:
         assert changed.wait_for(lambda: len(volume.renderers) == 2, 60)
-    scene.receive(other, Wish(**fields))
+    scene.receive(other, wish_of(1))
     with changed:
         assert changed.wait_for(lambda: "whole" in shown, 60)
     may_end.set()
@@ -855,15 +848,13 @@ def test_the_device_overtakes_the_host() -> None:
 
     volume, by_host = FakeVolume(refuse=refuse), FakeVolume(20_000, before_host_pass)
     host = by_host.renderer(device="host", size=(64, 48), samples=1, rays=True)
-    scene = Scene(volume, isovalue=80, make_camera=fake_camera, make_host=lambda v: host)
+    scene = Scene(volume, isovalue=80, make_host=lambda v: host)
     client = scene.join(post)
     assert client is not None
-    fields: Any = dict(id=1, isovalue=80.0, size=(32, 32), view=None, color=(1, 1, 1), samples=1)
-    fields |= dict(background=(0, 0, 0), max_error=None, time_budget=1000.0, ambient=0)
-    scene.receive(client, Wish(**fields))  # within a time: without a first picture
+    scene.receive(client, wish_of(1, time_budget=1.0))  # within a time: without a first picture
     assert done.wait(60)
     assert [f.stopped for f in by_host.frames] == [True]
-    assert [f.stopped for f in volume.frames if f.outputs == ("rgb",)] == [False]
+    assert [f.stopped for f in volume.frames if f.request.outputs == ("rgb",)] == [False]
     scene.close()
 
 
@@ -883,7 +874,7 @@ def test_infinite_ranges_are_those_of_the_histogram() -> None:
 
 def test_who_joins_early_is_welcomed_when_the_volume_is_known() -> None:
     volume = FakeVolume()
-    scene = Scene(volume, clock=Clock(), start=False, make_camera=fake_camera, isovalue=3)
+    scene = Scene(volume, clock=Clock(), start=False, isovalue=3)
     eye = Eye(scene)
     assert [h["type"] for h in eye.heads] == ["status"]
     run(scene)
@@ -970,7 +961,7 @@ def test_a_bucket_never_holds_more_than_its_burst() -> None:
 def test_100_reconnects_leave_nothing() -> None:
     threads = threading.active_count()
     volume = FakeVolume()
-    scene = Scene(volume, isovalue=80, size=(64, 48), make_camera=fake_camera)
+    scene = Scene(volume, isovalue=80, size=(64, 48))
     ready = threading.Event()
 
     def post(head: dict[str, Any], data: bytes | None) -> None:

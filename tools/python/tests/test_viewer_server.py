@@ -21,24 +21,16 @@ from typing import Any
 import httpx
 import pytest
 from conftest import TOP
-from viewer_fakes import FakeCamera, FakeVolume
+from viewer_fakes import FakeVolume
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 import isowave
+from isowave.viewer import command, view
 from isowave.viewer import server as server_module
-from isowave.viewer import view
+from isowave.viewer.command import main, make_parser, parse_bytes, parse_levels, parse_size
 from isowave.viewer.scene import Scene
-from isowave.viewer.server import (
-    Limits,
-    Server,
-    main,
-    make_parser,
-    parse_bytes,
-    parse_levels,
-    parse_size,
-    serve,
-)
+from isowave.viewer.server import Limits, Server, serve
 
 TIMEOUT = 60  # seconds; for machines that are busy with other things
 HELLO = '{"type": "hello", "version": 2}'
@@ -57,7 +49,6 @@ def serving(volume: FakeVolume | None = None, **options: Any) -> Iterator[Server
         volume or FakeVolume(),
         isovalue=80,
         size=(64, 48),
-        make_camera=lambda v: FakeCamera(v.eye, v.at, v.up, v.fovy),
         **options,
     )
     with Server(scene, limits=limits) as server:
@@ -597,7 +588,7 @@ def opened_by(arguments: list[str], monkeypatch: pytest.MonkeyPatch) -> dict[str
         seen.update(options)
         raise isowave.Error("seen")
 
-    monkeypatch.setattr(isowave, "open", fail)
+    monkeypatch.setattr(command, "open_volume", fail)
     assert main(arguments) == 1
     return seen
 
@@ -700,7 +691,7 @@ def test_bad_arguments_get_one_line_and_status_1(
     arguments: list[str],
     error: str,
 ) -> None:
-    monkeypatch.setattr(isowave, "open", lambda path: FakeVolume())
+    monkeypatch.setattr(command, "open_volume", lambda path: FakeVolume())
     try:
         status: object = main(["ball.nrrd", "--no-browser", *arguments])
     except SystemExit as ended:
@@ -720,7 +711,7 @@ def test_a_view_that_cannot_draw_ends_with_the_reason(
 ) -> None:
     with pytest.raises(RuntimeError, match="no such device: nonsense"):
         view(FakeVolume(refuse=failing), block=True, notebook=False, open_browser=False)
-    monkeypatch.setattr(isowave, "open", lambda path: FakeVolume(refuse=failing))
+    monkeypatch.setattr(command, "open_volume", lambda path: FakeVolume(refuse=failing))
     assert main(["ball.nrrd", "--no-browser", "--device", "nonsense"]) == 1
     output = capsys.readouterr()
     assert output.out.count("http://127.0.0.1:") == 2
@@ -761,12 +752,12 @@ def run_until_ctrl_c(tmp_path: Path, volume: str) -> tuple[int, str]:
     """Status and errors of `isowave view`, ended when a client has wished for a picture."""
     script = tmp_path / "run.py"
     script.write_text(
-        "import isowave, sys, signal, time\n"
+        "import sys, signal, time\n"
+        "from isowave.viewer import command\n"
         "from viewer_fakes import FakeVolume\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-        f"isowave.open = lambda path: {volume}\n"
-        "from isowave.viewer import main\n"
-        "sys.exit(main(['ball.nrrd', '--no-browser']))\n"
+        f"command.open_volume = lambda path: {volume}\n"
+        "sys.exit(command.main(['ball.nrrd', '--no-browser']))\n"
     )
     here = str(Path(__file__).parent)
     path = os.pathsep.join([here, *sys.path])

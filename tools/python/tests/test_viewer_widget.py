@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from viewer_fakes import FakeCamera, FakeVolume
+from viewer_fakes import FakeVolume
 
 import isowave
 
@@ -43,10 +43,6 @@ WISH: dict[str, Any] = {
 }
 
 
-def fake_camera(view: Any) -> FakeCamera:
-    return FakeCamera(view.eye, view.at, view.up, view.fovy)
-
-
 class FrontEnd:
     """What the kernel sent, by view; acknowledges pictures as view.js does."""
 
@@ -54,7 +50,7 @@ class FrontEnd:
         self.changed = threading.Condition()
         self.heads = dict[str, list[dict[str, Any]]]()
         self.pictures = list[bytes]()
-        self.widget = show(volume, isovalue=80, size=(64, 48), make_camera=fake_camera)
+        self.widget = show(volume, isovalue=80, size=(64, 48))
         self.widget.send = self._take
 
     def say(self, view: str, message: object) -> None:
@@ -156,10 +152,9 @@ def test_the_widget_carries_the_module() -> None:
 NOTEBOOK_CELL = """\
 import sys
 sys.path[:0] = {paths!r}
-from viewer_fakes import FakeCamera, FakeVolume
+from viewer_fakes import FakeVolume
 from isowave.viewer import view
-view(FakeVolume(), isovalue=80, title="ball", height=420,
-     make_camera=lambda v: FakeCamera(v.eye, v.at, v.up, v.fovy))
+view(FakeVolume(), isovalue=80, title="ball", height=420)
 """
 
 

@@ -7,23 +7,18 @@ passes when a test lets it, and counts what exists.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from isowave._camera import Camera
+from isowave._request import Request
+
 SIDE = 64  # voxels along each axis, spacing 1
 VALUES = 255.0  # at the centre; 0 at the middle of a face
-
-
-@dataclass(frozen=True)
-class FakeCamera:
-    eye: tuple[float, float, float]
-    at: tuple[float, float, float]
-    up: tuple[float, float, float] = (0.0, 1.0, 0.0)
-    fovy: float = 60.0
 
 
 @dataclass
@@ -44,18 +39,16 @@ class FakeImage:
 
 @dataclass
 class Drawn:
-    """One call of FakeRenderer.render."""
+    """One call of FakeRenderer.draw."""
 
-    isovalue: float
-    size: tuple[int, int]
-    samples: int
-    camera: FakeCamera
-    max_error: float | None
-    time_budget: float | None
-    ambient: int
-    outputs: tuple[str, ...]
+    request: Request
     passes: int = 0
     stopped: bool = False
+
+    @property
+    def size(self) -> tuple[int, int]:
+        assert self.request.size is not None
+        return self.request.size
 
 
 @dataclass
@@ -108,57 +101,41 @@ class FakeRenderer:
         width, height = options["size"]
         self.memory_bytes = 48 * width * height * options["samples"] ** 2
 
-    def camera(self, isovalue: float, size: tuple[int, int]) -> FakeCamera:
+    def camera(self, isovalue: float, size: tuple[int, int]) -> Camera:
         centre = (SIDE - 1) / 2
         away = 2.2 * max(2.0, self._radius(isovalue)) * max(1.0, size[1] / size[0])
-        return FakeCamera((centre, centre, centre + away), (centre, centre, centre))
+        return Camera((centre, centre, centre + away), (centre, centre, centre))
 
-    def render(
-        self,
-        isovalue: float,
-        *,
-        camera: FakeCamera,
-        size: tuple[int, int],
-        samples: int,
-        color: tuple[float, float, float],
-        background: tuple[float, float, float],
-        outputs: Sequence[str],
-        max_error: float | None,
-        time_budget: float | None,
-        ambient: int,
-        on_pass: Callable[[FakeProgress], bool] | None,
-    ) -> FakeImage:
+    def draw(self, request: Request) -> FakeImage:
+        drawn = Drawn(request)
         width, height = self._options["size"]
-        if size[0] * size[1] * samples**2 > width * height * self._options["samples"] ** 2:
+        columns, rows = drawn.size
+        if columns * rows * request.samples**2 > width * height * self._options["samples"] ** 2:
             raise RuntimeError("the renderer was not made for so many rays")
-        if ambient and not self._options["rays"]:
+        if request.ambient and not self._options["rays"]:
             raise RuntimeError("the renderer was not made for ambient rays")
-        if math.isnan(isovalue):
+        if math.isnan(request.isovalue):
             raise RuntimeError("the isovalue is not a number")
-        drawn = Drawn(
-            isovalue, size, samples, camera, max_error, time_budget, ambient, tuple(outputs)
-        )
         self._volume.frames.append(drawn)
-        picture = self._picture(isovalue, camera, size, color, background)
-        cached, image = isovalue in self._cache, picture
+        picture = self._picture(request)
+        cached, image = request.isovalue in self._cache, picture
         for i in range(self._volume.passes):
             self._volume.before_pass(drawn)
             drawn.passes += 1
-            rows = size[1] * (i + 1) // self._volume.passes
             image = picture.copy()
-            image[rows:] = _bytes(background)
+            image[rows * (i + 1) // self._volume.passes :] = _bytes(request.background)
             statistics = {
                 "passes": i + 1,
                 "decoded_blocks": 0 if cached else 100 * (i + 1),
                 "errors_are_stated": False,
             }
             percent = 100.0 * (i + 1) / self._volume.passes
-            if on_pass and not on_pass(FakeProgress(image, i + 1, percent)):
+            if request.on_pass and not request.on_pass(FakeProgress(image, i + 1, percent)):
                 drawn.stopped = True
                 return FakeImage(image, statistics, False)
-        self._cache.add(isovalue)
+        self._cache.add(request.isovalue)
         # Three quarters of the rays meet a surface; of these, two thirds are off by 0.2 pixels.
-        part = np.arange(size[0] * size[1], dtype=np.float32).reshape(size[1], size[0]) % 4
+        part = np.arange(columns * rows, dtype=np.float32).reshape(rows, columns) % 4
         depth = np.where(part == 0, np.inf, 5).astype(np.float32)
         bounds = np.choose(part.astype(int), [0, 0.2, 0.2, np.inf]).astype(np.float32)
         return FakeImage(image, statistics, True, depth, bounds)
@@ -167,16 +144,11 @@ class FakeRenderer:
     def _radius(isovalue: float) -> float:
         return SIDE / 2 * min(1.0, max(0.0, 1 - isovalue / VALUES))
 
-    def _picture(
-        self,
-        isovalue: float,
-        camera: FakeCamera,
-        size: tuple[int, int],
-        color: Sequence[float],
-        background: Sequence[float],
-    ) -> NDArray[np.uint8]:
+    def _picture(self, request: Request) -> NDArray[np.uint8]:
         """A lit ball with a chequered surface, so that turning it shows."""
-        width, height = size
+        camera, isovalue = request.camera, request.isovalue
+        assert camera is not None and request.size is not None
+        width, height = request.size
         eye = np.array(camera.eye)
         forward = _unit(np.array(camera.at) - eye)
         right = _unit(np.cross(forward, camera.up))
@@ -194,8 +166,8 @@ class FakeRenderer:
         normal = (rays * t[:, :, None] - to) / max(self._radius(isovalue), 1e-9)
         light = 0.2 + 0.8 * np.clip(-np.sum(normal * rays, axis=2), 0, 1)
         cells = np.floor(normal * 4).astype(int).sum(axis=2) % 2
-        shade = (light * (1 - 0.25 * cells))[:, :, None] * np.array(color)
-        rgb = np.where(hit[:, :, None], shade, np.array(background))
+        shade = (light * (1 - 0.25 * cells))[:, :, None] * np.array(request.color)
+        rgb = np.where(hit[:, :, None], shade, np.array(request.background))
         return np.round(255 * rgb).astype(np.uint8)
 
 
@@ -203,5 +175,5 @@ def _unit(v: NDArray[Any]) -> NDArray[Any]:
     return v / np.linalg.norm(v)
 
 
-def _bytes(color: Sequence[float]) -> NDArray[np.uint8]:
+def _bytes(color: Any) -> NDArray[np.uint8]:
     return np.round(255 * np.array(color)).astype(np.uint8)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -11,7 +10,7 @@ if TYPE_CHECKING:
     from .server import Server
     from .widget import Widget
 
-__all__ = ["main", "view"]
+__all__ = ["view"]
 
 
 def view(
@@ -46,12 +45,12 @@ def view(
         try:
             from . import widget
         except ImportError as error:
-            raise ImportError(_missing(error, "notebook")) from None
+            raise ImportError(missing(error, "notebook")) from None
         return widget.show(volume, **options)
     try:
         from . import server
     except ImportError as error:
-        raise ImportError(_missing(error, "view")) from None
+        raise ImportError(missing(error, "view")) from None
     served = server.serve(volume, **options)
     print(served.url, flush=True)
     if block is False or (block is None and _is_interactive()):
@@ -62,17 +61,8 @@ def view(
     return None
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """The command `isowave view`. Returns its exit status."""
-    try:
-        from .server import main as run
-    except ImportError as error:
-        print(f"isowave view: {_missing(error, 'view')}", file=sys.stderr)
-        return 1
-    return run(argv)
-
-
-def _missing(error: ImportError, extra: str) -> str:
+def missing(error: ImportError, extra: str) -> str:
+    """What to install when an optional package cannot be imported."""
     return f"{error.name or error} is missing: pip install 'isowave[{extra}]'"
 
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+
+from isowave import _core
+from isowave._camera import Camera
+from isowave._image import Image
+from isowave._levels import Voxels
+from isowave._renderer import draw
+from isowave._request import Request
 
 from .interfaces import RendererLike, VolumeLike
-
-if TYPE_CHECKING:
-    from isowave import Camera, Image, Volume
 
 
 class HostRenderer:
@@ -17,9 +20,7 @@ class HostRenderer:
     It draws full detail, whatever error or time is asked for, and knows no bounds.
     """
 
-    def __init__(self, volume: Volume) -> None:
-        from isowave import _core
-
+    def __init__(self, volume: Voxels) -> None:
         # A quarter of the host's memory at most; raises isowave.Error where that is not enough.
         self._core = _core.HostRenderer(volume._core, 0)
         self.device = {"name": "host", "memory_bytes": 0}
@@ -29,43 +30,13 @@ class HostRenderer:
         return 0
 
     def camera(self, isovalue: float, size: tuple[int, int]) -> Camera:
-        from isowave import Camera
-
         return Camera(*self._core.camera(isovalue, *size))
 
-    def render(
-        self,
-        isovalue: float,
-        *,
-        camera: Camera,
-        size: tuple[int, int],
-        samples: int,
-        color: tuple[float, float, float],
-        background: tuple[float, float, float],
-        outputs: Sequence[str],
-        max_error: float | None,
-        time_budget: float | None,
-        ambient: int,
-        on_pass: Callable[[Any], bool] | None,
-    ) -> Image:
-        from isowave._renderer import Image, draw, request_for
-
-        request = request_for(
-            isovalue,
-            camera,
-            size,
-            samples=samples,
-            color=color,
-            background=background,
-            outputs=outputs,
-            ambient=ambient,
-        )
-        frame = draw(self._core, request, on_pass, interrupts=False)
-        return Image(frame, camera, isovalue, samples, background)
+    def draw(self, request: Request) -> Image:
+        request = replace(request, max_error=None, time_budget=None)
+        return Image(draw(self._core, request, interrupts=False), request)
 
 
 def make_host(volume: VolumeLike) -> RendererLike | None:
     """A renderer of the host for a volume of isowave's; None for others."""
-    from isowave import Volume
-
-    return HostRenderer(volume) if isinstance(volume, Volume) else None
+    return HostRenderer(volume) if isinstance(volume, Voxels) else None

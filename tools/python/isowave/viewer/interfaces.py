@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
+from isowave._camera import Camera
+from isowave._request import Request
 
 
 class ImageLike(Protocol):
@@ -49,26 +52,6 @@ class ProgressLike(Protocol):
         ...
 
 
-class CameraLike(Protocol):
-    """What the viewer needs of isowave.Camera."""
-
-    @property
-    def eye(self) -> tuple[float, float, float]:
-        ...
-
-    @property
-    def at(self) -> tuple[float, float, float]:
-        ...
-
-    @property
-    def up(self) -> tuple[float, float, float]:
-        ...
-
-    @property
-    def fovy(self) -> float:
-        ...
-
-
 class RendererLike(Protocol):
     """What the viewer needs of isowave.Renderer."""
 
@@ -80,24 +63,10 @@ class RendererLike(Protocol):
     def memory_bytes(self) -> int:
         ...
 
-    def camera(self, isovalue: float, size: tuple[int, int]) -> CameraLike:
+    def camera(self, isovalue: float, size: tuple[int, int]) -> Camera:
         ...
 
-    def render(
-        self,
-        isovalue: float,
-        *,
-        camera: Any,
-        size: tuple[int, int],
-        samples: int,
-        color: tuple[float, float, float],
-        background: tuple[float, float, float],
-        outputs: Sequence[str],
-        max_error: float | None,
-        time_budget: float | None,
-        ambient: int,
-        on_pass: Callable[[Any], bool] | None,
-    ) -> ImageLike:
+    def draw(self, request: Request) -> ImageLike:
         ...
 
 

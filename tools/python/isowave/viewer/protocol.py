@@ -25,6 +25,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
+from isowave._camera import Camera
+from isowave._request import Request
+
 VERSION: Final = 2
 MAX_MESSAGE_BYTES: Final = 8192
 MAX_SIDE: Final = 8192  # pixels of a picture along each axis
@@ -33,21 +36,12 @@ MAX_AMBIENT: Final = 255  # rays of a hit, as the library has it
 MAX_TIME_BUDGET: Final = 10_000  # ms
 MAX_FLOAT32: Final = 3.4028234663852886e38
 MAX_LENGTH: Final = 1e18  # of a camera's coordinates [world units]
+MAX_RAYS: Final = 150_000_000  # of a client's picture, with the ambient ones
 MAX_ID: Final = 2**53 - 1  # what JavaScript counts to
 
 
 class ProtocolError(ValueError):
     """A message that no front end of ours sends. Its text says why, in one line."""
-
-
-@dataclass(frozen=True)
-class View:
-    """A camera, in world space (x, y, z). fovy: the full vertical angle [degrees]."""
-
-    eye: tuple[float, float, float]
-    at: tuple[float, float, float]
-    up: tuple[float, float, float]
-    fovy: float
 
 
 @dataclass(frozen=True)
@@ -57,18 +51,19 @@ class Hello:
 
 @dataclass(frozen=True)
 class Wish:
-    """What a front end wants to see. Of a client's wishes only the newest counts."""
+    """What a front end wants to see. Of a client's wishes only the newest counts.
+
+    request  the whole picture, with a size; without a camera: the surface fills the picture
+    """
 
     id: int  # grows with each wish of a client
-    isovalue: float
-    size: tuple[int, int]  # width, height [pixels]
-    view: View | None  # None: the view in which the surface fills the picture
-    color: tuple[float, float, float]  # of the surface, sRGB, 0 to 1
-    background: tuple[float, float, float]
-    samples: int  # rays of a pixel along each axis
-    max_error: float | None  # of the surface [pixels]; None: full detail
-    time_budget: float | None  # of a picture [ms], without max_error; None: as long as it takes
-    ambient: int  # rays of a hit that find out how much of the sky it sees
+    request: Request
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width, height [pixels]."""
+        assert self.request.size is not None
+        return self.request.size
 
 
 @dataclass(frozen=True)
@@ -137,6 +132,12 @@ def check(content: object) -> Message:
     return read(content)
 
 
+def first_line(error: Exception) -> str:
+    """What an error says, in one line of bounded length."""
+    lines = str(error).strip().splitlines()
+    return (lines[0] if lines else type(error).__name__)[:500]
+
+
 def _no_constant(name: str) -> object:
     raise ProtocolError(f"a message contains {name}")
 
@@ -168,7 +169,7 @@ def _triple(value: object, low: float, high: float, what: str) -> tuple[float, f
     return x, y, z
 
 
-def _view(value: object) -> View | None:
+def _camera(value: object) -> Camera | None:
     if value is None:
         return None
     if not isinstance(value, dict) or value.keys() != {"eye", "at", "up", "fovy_deg"}:
@@ -182,7 +183,7 @@ def _view(value: object) -> View | None:
     cosine = sum(f / length * (u / height if height else 0) for f, u in zip(forward, up))
     if height == 0 or abs(cosine) > 1 - 1e-12:
         raise ProtocolError("camera: up is parallel to the view, or zero")
-    return View(eye, at, up, fovy)
+    return Camera(eye, at, up, fovy)
 
 
 def _optional(value: object, low: float, high: float, what: str) -> float | None:
@@ -201,18 +202,20 @@ def _read_wish(content: dict[str, Any]) -> Wish:
         raise ProtocolError("a picture keeps max_error or time_budget, not both")
     if not isinstance(size, list) or len(size) != 2:
         raise ProtocolError("size must be two integers")
-    return Wish(
-        id=_integer(content["id"], 0, MAX_ID, "id"),
+    time_budget = _optional(content["time_budget"], 1, MAX_TIME_BUDGET, "time_budget")
+    request = Request(
         isovalue=_number(content["isovalue"], -MAX_FLOAT32, MAX_FLOAT32, "isovalue"),
+        camera=_camera(content["camera"]),
         size=(_integer(size[0], 1, MAX_SIDE, "size"), _integer(size[1], 1, MAX_SIDE, "size")),
-        view=_view(content["camera"]),
+        samples=_integer(content["samples"], 1, MAX_SAMPLES, "samples"),
         color=_triple(content["color"], 0, 1, "color"),
         background=_triple(content["background"], 0, 1, "background"),
-        samples=_integer(content["samples"], 1, MAX_SAMPLES, "samples"),
+        outputs=("rgb",),
         max_error=_optional(content["max_error"], 1e-3, 1e3, "max_error"),
-        time_budget=_optional(content["time_budget"], 1, MAX_TIME_BUDGET, "time_budget"),
+        time_budget=None if time_budget is None else time_budget / 1000,
         ambient=_integer(content["ambient"], 0, MAX_AMBIENT, "ambient"),
     )
+    return Wish(_integer(content["id"], 0, MAX_ID, "id"), request)
 
 
 def _read_ack(content: dict[str, Any]) -> Ack:

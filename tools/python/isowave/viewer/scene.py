@@ -24,11 +24,13 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from isowave._camera import Camera
+
 from .host import make_host
 from .interfaces import ImageLike, ProgressLike, RendererLike, VolumeLike
 from .pictures import Extent, Stopped, dividing_value, encode_jpeg, encode_png, share_within
-from .protocol import Ack, Budget, Hello, Message, ProtocolError, TokenBucket, View, Wish
-from .protocol import MAX_FLOAT32, VERSION, check
+from .protocol import Ack, Budget, Hello, Message, ProtocolError, TokenBucket, Wish
+from .protocol import MAX_FLOAT32, MAX_RAYS, VERSION, check, first_line
 
 MAX_IN_FLIGHT: Final = 2  # pictures on the way to a client
 FIRST_DIVISOR: Final = 4  # of width and height, for the first picture
@@ -44,7 +46,6 @@ SHOW_SECONDS: Final = 0.15  # without a picture, until what a cancelled one has 
 HOST_SECONDS: Final = 0.5  # for a device to be ready, before the host draws meanwhile
 GIVE_BACK_SECONDS: Final = 5.0  # without need of a large renderer, until a smaller one is made
 CLOSE_SECONDS: Final = 0.5  # for threads to end; a pass may take longer
-MAX_RAYS: Final = 150_000_000  # of a client's picture, with the ambient ones
 MAX_CAMERA_RAYS: Final = 1 << 24  # of them, from the camera: memory, and how long a pass takes
 TOO_MANY_BUDGETS: Final = "the memory budget was changed too often: try again in a few seconds"
 
@@ -71,7 +72,7 @@ class Client:
     post: Post
     wish: Wish | None = None
     stage: Stage = Stage.DONE
-    view: View | None = None  # of the wish, once it is known
+    camera: Camera | None = None  # of the wish, once it is known
     gave_way: int = 0  # how often the wish's whole picture was interrupted for another client
     due: float = -math.inf  # when the stage may begin
     lossless: tuple[dict[str, Any], NDArray[np.uint8]] | None = None  # what it is made of
@@ -103,7 +104,7 @@ class _Frame:
     client: Client
     wish: Wish
     stage: Stage
-    view: View
+    camera: Camera
     began: float
     extent: Extent
     passes: int = 0
@@ -145,7 +146,6 @@ class Scene:
         samples: int = 1,
         max_clients: int = 16,
         max_rays: int = MAX_RAYS,
-        make_camera: Callable[[View], Any] | None = None,
         make_host: Callable[[VolumeLike], RendererLike | None] = make_host,
         clock: Callable[[], float] = time.monotonic,
         start: bool = True,
@@ -157,7 +157,6 @@ class Scene:
                 raise ValueError(f"{name} {limit}: give 1 or more")
         self._volume, self._isovalue, self._title = volume, isovalue, title
         self._device, self._max_clients = device, max_clients
-        self._make_camera = make_camera or _isowave_camera
         self._make_host, self._clock = make_host, clock
         self._changed = threading.Condition()
         self._clients: list[Client] = []  # who comes next is in front
@@ -389,25 +388,21 @@ class Scene:
         self, renderer: RendererLike, client: Client, wish: Wish, stage: Stage, extent: Extent
     ) -> None:
         began = self._clock()
-        view = client.view or wish.view or home_view(renderer, wish)
+        camera = client.camera or renderer.camera(wish.request.isovalue, wish.size)
         with self._changed:
             if client.wish is not wish:
                 return
-            client.view = view
-        frame = _Frame(client, wish, stage, view, began, extent, by_host=renderer is self._host)
-        image = renderer.render(
-            wish.isovalue,
-            camera=self._make_camera(view),
+            client.camera = camera
+        frame = _Frame(client, wish, stage, camera, began, extent, by_host=renderer is self._host)
+        request = replace(
+            wish.request,
+            camera=camera,
             size=extent.size,
             samples=extent.samples,
-            color=wish.color,
-            background=wish.background,
-            max_error=wish.max_error,
-            outputs=("rgb",),
-            time_budget=None if wish.time_budget is None else wish.time_budget / 1000,
             ambient=extent.ambient,
             on_pass=lambda so_far: self._on_pass(frame, so_far),
         )
+        image = renderer.draw(request)
         if frame.stopped:
             self._show_what_there_is(frame, image)
             return
@@ -517,22 +512,22 @@ class Scene:
         self, renderer: RendererLike, client: Client, wish: Wish, extent: Extent
     ) -> None:
         """How far the surface may be off, by the rays of a first picture: bounds take time."""
-        if client.view is None:
+        if client.camera is None:
             return
         pixels = extent.size[1] / wish.size[1]  # of the first picture, to one of the whole picture
-        image = renderer.render(
-            wish.isovalue,
-            camera=self._make_camera(client.view),
+        max_error = wish.request.max_error
+        request = replace(
+            wish.request,
+            camera=client.camera,
             size=extent.size,
             samples=extent.samples,
-            color=wish.color,
-            background=wish.background,
             outputs=("depth", "bounds"),
-            max_error=None if wish.max_error is None else wish.max_error * pixels,
+            max_error=None if max_error is None else max_error * pixels,
             time_budget=None,
             ambient=0,
             on_pass=lambda so_far: client.wish is wish and not self._closing,
         )
+        image = renderer.draw(request)
         with self._changed:
             if client.wish is wish:
                 client.stage = Stage.DONE
@@ -546,8 +541,10 @@ class Scene:
 
     def _plan(self, wish: Wish) -> Extent:
         """The whole picture of a wish, as far as the server's limits and the memory allow it."""
-        ambient = wish.ambient if self._may_have_ambient else 0
-        return Extent(wish.size, wish.samples, ambient).within(self._ray_limit, self._max_rays)
+        ambient = wish.request.ambient if self._may_have_ambient else 0
+        return Extent(wish.size, wish.request.samples, ambient).within(
+            self._ray_limit, self._max_rays
+        )
 
     def _grow(self, wish: Wish, stage: Stage) -> bool:
         """Wants a renderer for more rays, or ambient ones, if the wish's picture has such."""
@@ -651,8 +648,8 @@ class Scene:
     def _take_wish(self, client: Client, wish: Wish) -> None:
         if client.wish is not None and wish.id <= client.wish.id:
             raise ProtocolError("the numbers of wishes must grow")
-        skip_first = client.whole_seconds < QUICK_SECONDS or wish.time_budget is not None
-        client.wish, client.view = wish, wish.view
+        skip_first = client.whole_seconds < QUICK_SECONDS or wish.request.time_budget is not None
+        client.wish, client.camera = wish, wish.request.camera
         client.stage = Stage.WHOLE if skip_first else Stage.FIRST
         client.gave_way, client.lossless, client.due = 0, None, -math.inf
         self._note_needs()
@@ -687,7 +684,7 @@ class Scene:
         return {
             **self._head(frame, frame.stage.value),
             "reduced": self._reduced(frame),
-            "notice": self._volume.isovalue_notice(frame.wish.isovalue),
+            "notice": self._volume.isovalue_notice(frame.wish.request.isovalue),
             "complete": bool(image.complete),
             "passes": int(statistics["passes"]),
             "percent": 100.0,
@@ -696,7 +693,7 @@ class Scene:
         }
 
     def _head(self, frame: _Frame, stage: str) -> dict[str, Any]:
-        view = frame.view
+        camera = frame.camera
         return {
             "type": "picture",
             "wish": frame.wish.id,
@@ -707,12 +704,12 @@ class Scene:
             "ambient": frame.extent.ambient,
             "reduced": None,
             "notice": "",
-            "isovalue": frame.wish.isovalue,
+            "isovalue": frame.wish.request.isovalue,
             "camera": {
-                "eye": list(view.eye),
-                "at": list(view.at),
-                "up": list(view.up),
-                "fovy_deg": view.fovy,
+                "eye": list(camera.eye),
+                "at": list(camera.at),
+                "up": list(camera.up),
+                "fovy_deg": camera.fovy,
             },
             "complete": False,
             "ms": round((self._clock() - frame.began) * 1e3, 2),
@@ -725,7 +722,7 @@ class Scene:
     def _reduced(self, frame: _Frame) -> str | None:
         """Why a whole picture has fewer rays than its wish, in one line; None: it has all."""
         wish, extent = frame.wish, frame.extent
-        asked = Extent(wish.size, wish.samples, wish.ambient)
+        asked = Extent(wish.size, wish.request.samples, wish.request.ambient)
         if frame.stage is not Stage.WHOLE or extent == asked:
             return None
         why = "The device has no memory for more"
@@ -881,12 +878,6 @@ class TooManyClients(ProtocolError):
     """The scene has as many clients as it may have."""
 
 
-def home_view(renderer: RendererLike, wish: Wish) -> View:
-    """The view in which the surface fills the picture."""
-    camera = renderer.camera(wish.isovalue, wish.size)
-    return View(camera.eye, camera.at, camera.up, camera.fovy)
-
-
 def picture_of(image: ImageLike) -> NDArray[np.uint8]:
     rgb = image.rgb
     assert rgb is not None  # it was asked for
@@ -895,18 +886,6 @@ def picture_of(image: ImageLike) -> NDArray[np.uint8]:
 
 def _count(number: int, thing: str) -> str:
     return f"{number} {thing}{'s' * (number != 1)}"
-
-
-def first_line(error: Exception) -> str:
-    """What an error says, in one line of bounded length."""
-    lines = str(error).strip().splitlines()
-    return (lines[0] if lines else type(error).__name__)[:500]
-
-
-def _isowave_camera(view: View) -> Any:
-    import isowave
-
-    return isowave.Camera(view.eye, view.at, view.up, view.fovy)
 
 
 def _finite(value: object) -> float | None:

@@ -1,0 +1,280 @@
+#include "core/bricks/team_renderer.hpp"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <exception>
+#include <utility>
+
+#include "core/base/error.hpp"
+#include "core/base/ms_since.hpp"
+#include "core/bricks/ranks.hpp"
+#include "core/frame/surface_camera.hpp"
+#include "core/view/detail.hpp"
+
+namespace isowave::core {
+
+namespace {
+
+RendererOptions options_for(const TeamVolume &volume, RendererOptions options) {
+  options.with_levels = volume.num_levels > 1;
+  options.range_thresholds = volume.range_thresholds;
+  return options;
+}
+
+}  // namespace
+
+TeamRenderer::TeamRenderer(ocl::Device &device, const TeamVolume &volume, RendererOptions options,
+                           Team &team)
+    : TeamRenderer(device, volume.brick, options_for(volume, std::move(options)), volume.cuts,
+                   volume.levels, team) {}
+
+TeamRenderer::TeamRenderer(ocl::Device &device, const CompressedVolume &volume,
+                           const RendererOptions &options, const Cuts &cuts,
+                           std::vector<VolumeInfo> whole, Team &team)
+    : renderer_(device, volume, options),
+      brick_(volume.info),
+      cuts_(cuts),
+      whole_levels_(std::move(whole)),
+      num_levels_(options.with_levels ? 1 + volume.coarser_levels.size() : 1),
+      team_(team) {}
+
+/// Throws Error if one renderer of the whole would draw with levels that bricks do not have.
+void TeamRenderer::check_levels(const FrameRequest &request) const {
+  if (request.voxel_pixels == 0 || num_levels_ == whole_levels_.size()) return;
+  const std::vector<FrameParams> frames =
+      make_level_frames(whole_levels_, request.camera, size_of(request, abilities()),
+                        request.isovalue, request.voxel_pixels);
+  if (num_levels_ > 1 &&
+      std::none_of(frames.begin() + std::ptrdiff_t(num_levels_), frames.end(), draws))
+    return;
+  throw Error(
+      "{} bricks can be cut at {} of the {} levels of detail, and with voxels {:.3g} pixels apart "
+      "the frame has coarser ones: start fewer processes, or convert with --levels {}",
+      team_.size(), num_levels_, whole_levels_.size(), request.voxel_pixels, num_levels_);
+}
+
+FrameStats TeamRenderer::render(const FrameRequest &request) {
+  check(request, abilities());
+  check_levels(request);
+  const View view = make_view(whole_levels_.front(), request.camera, size_of(request, abilities()));
+  place_ = cuts_.order_from({view.eye_x, view.eye_y, view.eye_z})[team_.rank()];
+  own_hits_.clear();
+  num_hits_.reset();
+  has_whole_ = false;
+  FrameRequest own = request;
+  own.ambient_rays = 0;
+  FrameStats stats;
+  if (request.on_pass) {
+    stats = render_in_step(own);
+  } else {
+    together(team_, [&] { stats = renderer_.render(own); });
+  }
+  if (request.ambient_rays != 0 && !stats.cancelled) add_ambient(request, stats);
+  stats.complete = !stats.cancelled;
+  return stats;
+}
+
+/// A rank that is through goes on to take part in pictures, until all are.
+FrameStats TeamRenderer::render_in_step(const FrameRequest &request) {
+  enum State : char { kAtWork, kThrough, kFailed };
+  bool all_through = false, one_failed = false, is_stopped = false;
+  PassStats last;
+  const auto tell = [&](State state) {
+    const std::vector<std::string> states = team_.all_gather(std::string(1, state));
+    const auto is = [](State wanted) {
+      return [wanted](const std::string &each) { return each.front() == wanted; };
+    };
+    all_through = std::ranges::all_of(states, is(kThrough));
+    one_failed = std::ranges::any_of(states, is(kFailed));
+  };
+  const auto take_part = [&](State state) {
+    tell(state);
+    if (all_through || one_failed) return false;
+    own_hits_.clear();
+    is_stopped = !request.on_pass(last);
+    return !is_stopped;
+  };
+  FrameStats stats;
+  FrameRequest own = request;
+  own.on_pass = [&](const PassStats &pass) {
+    last = pass;
+    return take_part(kAtWork);
+  };
+  try {
+    stats = renderer_.render(own);
+    while (!is_stopped && !one_failed && take_part(kThrough)) {
+    }
+  } catch (...) {
+    if (!is_stopped && !one_failed) tell(kFailed);
+    const auto failure = std::current_exception();
+    together(team_, [&] { std::rethrow_exception(failure); });
+  }
+  together(team_, [] {});
+  const std::vector<std::string> cancelled =
+      team_.all_gather(stats.cancelled ? "cancelled" : std::string());
+  stats.cancelled =
+      std::ranges::any_of(cancelled, [](const std::string &each) { return !each.empty(); });
+  return stats;
+}
+
+Camera TeamRenderer::camera(std::span<const float> isovalues, std::optional<ImageSize> size) {
+  std::optional<BlockBox> own;
+  together(team_, [&] { own = renderer_.surface_box(isovalues); });
+  return surface_camera(whole_levels_.front(), gather_box(team_, brick_, own),
+                        size.value_or(abilities().largest));
+}
+
+/// The kept picture may fill own hits, but not those of all bricks.
+void TeamRenderer::fill_from_kept() {
+  renderer_.fill_from_kept();
+  if (!has_whole_) own_hits_.clear();
+}
+
+void TeamRenderer::enlarge_kept(const FrameRequest &request) {
+  renderer_.enlarge_kept(request);
+  if (!has_whole_) own_hits_.clear();
+}
+
+/// All ranks get the hits that are seen, and each casts their rays through its brick. A ray is open
+/// where it meets nothing in any.
+void TeamRenderer::add_ambient(const FrameRequest &request, FrameStats &stats) {
+  std::vector<HitRecord> placed;
+  together(team_, [&] {
+    own_hits();
+    placed = renderer_.placed_hits();
+  });
+  const std::vector<HitRecord> hits = compose_hits(placed, kHitFields, Receiver::kAll);
+  OpenCounts open{std::vector<uchar>(hits.size()), 0};
+  together(team_, [&] {
+    const std::vector<FrameParams> frames =
+        make_level_frames(std::span(whole_levels_).first(num_levels_), request.camera,
+                          renderer_.size(), request.isovalue, request.voxel_pixels);
+    const auto first = std::ranges::find_if(frames, draws);
+    const auto end = std::find_if_not(first, frames.end(), draws);
+    renderer_.begin_ambient(request, hits,
+                            {static_cast<std::size_t>(first - frames.begin()),
+                             static_cast<std::size_t>(end - frames.begin())});
+  });
+  has_whole_ = true;
+  for (std::uint32_t round = 0; round < request.ambient_rays && !stats.cancelled; ++round) {
+    std::vector<std::uint64_t> blocked;
+    together(team_,
+             [&] { blocked = renderer_.blocked_rays(round, request.ambient_rays, stats.ambient); });
+    const auto [make, take] = in_place(blocked);
+    reduce(blocked.size(), Reduction::kOr, Receiver::kRank0, make, take);
+    open.num_ambient = round + 1;
+    for (std::size_t ray = 0; ray < hits.size(); ++ray) {
+      const bool is_open = std::isfinite(hits[ray].t) && (blocked[ray / 64] >> ray % 64 & 1) == 0;
+      open.counts[ray] = static_cast<uchar>(open.counts[ray] + is_open);
+    }
+    const bool is_last = open.num_ambient == request.ambient_rays;
+    if (!is_last && !request.on_pass) continue;
+    together(team_, [&] {
+      renderer_.set_open(open);
+      PassStats pass;
+      pass.completed_percent = 100;
+      stats.cancelled = request.on_pass && !request.on_pass(pass) && !is_last;
+    });
+  }
+}
+
+std::span<const HitRecord> TeamRenderer::own_hits() {
+  if (own_hits_.empty()) own_hits_ = renderer_.hits();
+  return own_hits_;
+}
+
+void TeamRenderer::reduce(std::size_t count, Reduction how, Receiver who, const MakeWords &make,
+                          const TakeWords &take) {
+  const auto begin = std::chrono::steady_clock::now();
+  team_.reduce(count, how, who, make, take);
+  composition_.ms += ms_since(begin);
+  ++composition_.reductions;
+  composition_.bytes += count * sizeof(std::uint64_t);
+}
+
+void TeamRenderer::compose_colors(std::span<const std::uint32_t> colors, Image8 &image) {
+  const bool in_halves = team_.size() <= kMostHalfWordBricks;
+  const std::size_t per_word = in_halves ? 2 : 1;
+  std::atomic<std::uint64_t> num_hits = 0;
+  reduce((colors.size() + per_word - 1) / per_word,
+         in_halves ? Reduction::kMinOfHalves : Reduction::kMin, Receiver::kRank0,
+         [&](std::size_t begin, std::span<std::uint64_t> words) {
+           const std::size_t first = per_word * begin;
+           const auto own =
+               colors.subspan(first, std::min(per_word * words.size(), colors.size() - first));
+           (in_halves ? color_halves : color_words)(own, place_, words);
+         },
+         [&](std::size_t begin, std::span<const std::uint64_t> words) {
+           num_hits += (in_halves ? set_half_colors : set_colors)(words, per_word * begin, image);
+         });
+  num_hits_ = num_hits;
+}
+
+void TeamRenderer::compose(Receiver who, const MakeWords &make, const TakeWords &take) {
+  std::atomic<std::uint64_t> num_hits = 0;
+  reduce(renderer_.size().num_rays(), Reduction::kMin, who, make,
+         [&](std::size_t begin, std::span<const std::uint64_t> words) {
+           take(begin, words);
+           num_hits += static_cast<std::uint64_t>(std::ranges::count_if(
+               words, [](std::uint64_t word) { return word >> 32 != kNoPlace; }));
+         });
+  num_hits_ = num_hits;
+}
+
+std::vector<HitRecord> TeamRenderer::compose_hits(std::span<const HitRecord> own,
+                                                  std::span<const HitField> fields, Receiver who) {
+  const bool receives = who == Receiver::kAll || team_.rank() == 0;
+  std::vector<HitRecord> hits(receives ? own.size() : 0, no_hit());
+  for (const HitField field : fields) {
+    compose(
+        who,
+        [&](std::size_t begin, std::span<std::uint64_t> words) {
+          field_words(own.subspan(begin, words.size()), field, place_, words);
+        },
+        [&](std::size_t begin, std::span<const std::uint64_t> words) {
+          set_field(words, field, std::span(hits).subspan(begin, words.size()));
+        });
+  }
+  return hits;
+}
+
+Image8 TeamRenderer::shade(const Appearance &appearance) {
+  const bool receives = team_.rank() == 0;
+  if (has_whole_) return receives ? renderer_.shade(appearance) : Image8{};
+  const ImageSize size = renderer_.size();
+  if (size.samples > 1) {
+    // The mean of a pixel's colours is made of more than 8 bits of each.
+    constexpr HitField kShaded[] = {HitField::kT, HitField::kGradX, HitField::kGradY,
+                                    HitField::kGradZ};
+    const std::vector<HitRecord> hits = compose_hits(own_hits(), kShaded);
+    if (!receives) return {};
+    renderer_.set_hits(hits);
+    Image8 image = renderer_.shade(appearance);
+    renderer_.set_hits(own_hits());  // passes may follow
+    return image;
+  }
+  const std::vector<std::uint32_t> colors = renderer_.shade_packed(appearance);
+  Image8 image;
+  if (receives) image = {size.width, size.height, 3, std::vector<std::uint8_t>(3 * colors.size())};
+  compose_colors(colors, image);
+  return image;
+}
+
+std::vector<float> TeamRenderer::depth() {
+  constexpr HitField kDepth[] = {HitField::kT};
+  return depth_of(compose_hits(own_hits(), kDepth));
+}
+
+std::uint64_t TeamRenderer::num_hits(const FrameStats &) {
+  if (!num_hits_) depth();
+  return num_hits_.value();
+}
+
+std::vector<HitRecord> TeamRenderer::hits() {
+  return compose_hits(own_hits(), kHitFields);
+}
+
+}  // namespace isowave::core

@@ -1,0 +1,114 @@
+#pragma once
+// Draws one brick of a volume, and with the team that draws the others the picture of the whole:
+// at rank 0, with the bits that one renderer of all would draw.
+
+#include <optional>
+#include <vector>
+
+#include "core/base/team.hpp"
+#include "core/bricks/compose.hpp"
+#include "core/bricks/cuts.hpp"
+#include "core/bricks/team_volume.hpp"
+#include "core/frame/renderer.hpp"
+#include "core/render/device_renderer.hpp"
+
+namespace isowave::core {
+
+/// What put pictures together so far, at this rank.
+struct CompositionStats {
+  std::uint64_t reductions = 0, bytes = 0;  ///< words that this rank gave
+  double ms = 0;                            ///< wall clock, with the wait for slower ranks
+};
+
+/// Draws the whole volume by the bricks of all ranks.
+class TeamRenderer : public Renderer {
+ public:
+  /// cuts    as many bricks as ranks; each rank draws that of its number. As device and team, must
+  ///         outlive the renderer
+  /// volume  it: see brick_volume.hpp
+  /// whole   grids of the whole volume's levels of detail, the finest first: those that the brick
+  ///         has, and others that frames do without
+  /// Throws  Error: as DeviceRenderer, at the rank that it is about
+  TeamRenderer(ocl::Device &device, const CompressedVolume &volume, const RendererOptions &options,
+               const Cuts &cuts, std::vector<VolumeInfo> whole, Team &team);
+  /// The same of a volume that the team has opened, which must outlive the renderer, too.
+  ///
+  /// options  with_levels and range_thresholds become the volume's
+  TeamRenderer(ocl::Device &device, const TeamVolume &volume, RendererOptions options, Team &team);
+
+  Abilities abilities() const override {
+    Abilities abilities = renderer_.abilities();
+    abilities.cells = false;
+    return abilities;
+  }
+  Team &team() override { return team_; }
+  std::vector<VolumeInfo> levels() const override { return whole_levels_; }
+
+  /// Draws this rank's brick. Ambient rays go through those of all ranks.
+  ///
+  /// request  its on_pass, which all ranks have or none, is called at all of them after each pass
+  ///          that any has, be this rank through or not: it may ask for the picture so far, and
+  ///          must return the same at all
+  /// Returns  what that took; cancelled: if any rank is not through
+  /// Throws   Error at every rank: as DeviceRenderer::render(), and what on_pass throws, at one;
+  /// one
+  ///          renderer of the whole would draw with levels of detail that bricks do not have, and
+  ///          this one with finer ones
+  FrameStats render(const FrameRequest &request) override;
+  /// Throws  Error: rays go on in other bricks
+  std::vector<HitRecord> cast_rays(std::span<const WorldRay> rays, float isovalue,
+                                   Normals normals) override {
+    return renderer_.cast_rays(rays, isovalue, normals);
+  }
+  Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {}) override;
+
+  ImageSize size() const override { return renderer_.size(); }
+  /// Colours are put together, or, of several rays a pixel, hits, which rank 0 shades.
+  Image8 shade(const Appearance &appearance = {}) override;
+  std::vector<float> depth() override;
+  /// Hits without the ids of their blocks.
+  std::vector<HitRecord> hits() override;
+  /// Puts the frame's depth together, if nothing was put together yet.
+  std::uint64_t num_hits(const FrameStats &stats) override;
+
+  void keep_picture() override { renderer_.keep_picture(); }
+  void fill_from_kept() override;
+  void enlarge_kept(const FrameRequest &request) override;
+  void clear_cache() override { renderer_.clear_cache(); }
+  std::uint64_t memory_bytes() const override { return renderer_.memory_bytes(); }
+  double setup_ms() const override { return renderer_.setup_ms(); }
+
+  /// This rank's.
+  const DeviceRenderer &renderer() const { return renderer_; }
+  const CompositionStats &composition() const { return composition_; }
+
+ private:
+  void check_levels(const FrameRequest &request) const;
+  FrameStats render_in_step(const FrameRequest &request);
+  void add_ambient(const FrameRequest &request, FrameStats &stats);
+  void reduce(std::size_t count, Reduction how, Receiver who, const MakeWords &make,
+              const TakeWords &take);
+  /// image: rank 0's, black.
+  void compose_colors(std::span<const std::uint32_t> colors, Image8 &image);
+  /// A word of each ray.
+  void compose(Receiver who, const MakeWords &make, const TakeWords &take);
+  /// Of bricks' hits, those that win.
+  std::vector<HitRecord> compose_hits(std::span<const HitRecord> own,
+                                      std::span<const HitField> fields,
+                                      Receiver who = Receiver::kRank0);
+  std::span<const HitRecord> own_hits();
+
+  DeviceRenderer renderer_;
+  VolumeInfo brick_;
+  const Cuts &cuts_;
+  std::vector<VolumeInfo> whole_levels_;
+  std::size_t num_levels_;  ///< of these, that the brick has
+  Team &team_;
+  std::uint32_t place_ = 0;                ///< of the brick, seen from the frame's eye
+  std::vector<HitRecord> own_hits_;        ///< empty: not read yet
+  bool has_whole_ = false;                 ///< the renderer has the hits of all bricks already
+  std::optional<std::uint64_t> num_hits_;  ///< of what was put together last
+  CompositionStats composition_;
+};
+
+}  // namespace isowave::core

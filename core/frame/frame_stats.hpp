@@ -1,0 +1,105 @@
+#pragma once
+// What drawing a frame has done.
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/view/frame.hpp"
+#include "kernels_cl/portable/shared_types.h"
+
+namespace isowave::core {
+
+/// What one pass did: the counts of the device, and what follows from them.
+struct PassStats {
+  PassCounts counts{};
+  double n_spec = 0;  ///< blocks that the pass's rays were to look ahead at, mean over the rays; 0
+                      ///< where none looked
+  /// Distinct blocks that rays were intersected in; not counted in pipeline `rays`, which does not
+  /// gather rays by block.
+  std::optional<std::uint32_t> visible_blocks{};
+  /// Distinct blocks whose voxels the pass's rays looked at, or, where a whole dual grid is asked
+  /// for, may have; only where the host waits after each pass.
+  std::optional<std::uint32_t> touched_blocks{};
+  double utilization_percent = 0;  ///< ray-block pairs that were intersected, of all rays
+  double completed_percent = 0;    ///< rays that have ended, of all
+  std::map<std::string, double>
+      stage_ms;  ///< by stage; empty unless the device was opened with profiling
+};
+
+/// What a part of a frame took that comes after the passes that found the hits.
+struct LaterPasses {
+  std::uint32_t passes = 0;
+  std::uint64_t decoded_blocks = 0;        ///< for it alone
+  std::uint64_t recycled_blocks = 0;       ///< see PassCounts::recycled_count
+  double ms = 0;                           ///< wall clock, of total_ms
+  std::map<std::string, double> stage_ms;  ///< as PassStats::stage_ms
+
+  LaterPasses &operator+=(const LaterPasses &other) {
+    passes += other.passes;
+    decoded_blocks += other.decoded_blocks;
+    recycled_blocks += other.recycled_blocks;
+    ms += other.ms;
+    for (const auto &[stage, time] : other.stage_ms) stage_ms[stage] += time;
+    return *this;
+  }
+};
+
+/// A picture that was drawn on the way to one within a time budget. If it was cancelled, since time
+/// was over, the picture before shows through its rays without a hit.
+struct TimedStep {
+  ImageSize size;
+  double voxel_pixels = 0;       ///< distance of voxels, in pixels of this step
+  double ms = 0;                 ///< wall clock
+  double completed_percent = 0;  ///< of its pixels
+  bool cancelled = false;
+};
+
+/// How precisely a frame is drawn.
+struct Detail {
+  double voxel_pixels = 0;  ///< FrameRequest::voxel_pixels
+  double voxel_error = 0;   ///< FrameRequest::voxel_error
+};
+
+/// The detail that was chosen to keep FrameRequest::max_surface_error.
+struct DetailChoice {
+  Detail detail;
+  bool reachable = true;  ///< most pixels keep the error at full detail
+  double median = 0;      ///< bound there [pixels]
+  /// If it is not reachable: the error of the volume's voxels, smaller than it is, with which the
+  /// median would be max_surface_error; none if no such error is known that a volume can be stored
+  /// with.
+  std::optional<double> tolerance{};
+  std::string advice{};  ///< what would help
+  /// A detail that was tried, and the share of pixels that are not certain to miss and keep the
+  /// error with it.
+  struct Try {
+    Detail detail;
+    double certified = 0;
+  };
+  std::vector<Try> tries;
+  double total_ms = 0;
+};
+
+/// What drawing a frame has done.
+struct FrameStats {
+  std::vector<PassStats> passes;                ///< that looked for hits
+  LaterPasses normals;                          ///< Normals::kSmooth
+  LaterPasses ambient;                          ///< of ambient rays
+  std::size_t first_level = 0, last_level = 0;  ///< of detail, that drew; 0: the finest
+  double total_ms = 0;  ///< wall clock, from camera to finished hit buffer on the device
+  std::uint64_t rays_hit = 0;
+  std::uint64_t uploaded_blocks = 0;  ///< from a compressed volume on the host ...
+  std::uint64_t uploaded_bytes = 0;   ///< ... and their bytes
+  /// on_pass said so before the picture was finished; the hit buffer holds the picture so far. If
+  /// the last of `passes` has left no rays, that has all hits, some with the gradients of their
+  /// cells, or of fewer ambient rays.
+  bool cancelled = false;
+  bool complete = true;                  ///< false: cancelled, or the time budget was over
+  std::vector<TimedStep> steps{};        ///< with a time budget: in the order of drawing
+  std::optional<DetailChoice> detail{};  ///< with a largest surface error
+};
+
+}  // namespace isowave::core

@@ -1,0 +1,84 @@
+#include "core/frame/renderer.hpp"
+
+#include <cmath>
+#include <stdexcept>
+
+#include "core/base/error.hpp"
+#include "core/frame/ambient_rays.hpp"
+#include "core/view/detail.hpp"
+
+namespace isowave::core {
+
+namespace {
+
+/// What must be chosen by the renderer, or by the user, not by both.
+void check_choices(const FrameRequest &request) {
+  if (!request.max_surface_error) return;
+  if (request.time_budget_ms)
+    throw Error("a frame cannot keep both an error and a time: give one of the two");
+  if (request.voxel_pixels != 0 || request.voxel_error != 0)
+    throw Error("max_surface_error chooses the detail: leave out voxel_pixels and voxel_error");
+  if (request.bound != FieldBound::kNone)
+    throw Error("the surface of a bound has no error: draw the volume itself");
+}
+
+}  // namespace
+
+void check_max_surface_error(double max_surface_error) {
+  if (!(max_surface_error > 0) || !std::isfinite(max_surface_error))
+    throw Error("an error of {} pixels cannot be kept: give more than 0", max_surface_error);
+}
+
+void check_time_budget(double budget_ms) {
+  if (!(budget_ms > 0) || !std::isfinite(budget_ms))
+    throw Error("no picture can be drawn in {} ms: give more than 0", budget_ms);
+}
+
+void check(const FrameRequest &request, const Abilities &abilities) {
+  const ImageSize size = size_of(request, abilities);
+  check_image_size(size);
+  check_voxel_pixels(request.voxel_pixels);
+  with_fewer_planes({}, request.voxel_error);  // or throws
+  check_ambient_rays(request.ambient_rays);
+  if (request.max_surface_error) check_max_surface_error(*request.max_surface_error);
+  if (request.time_budget_ms) check_time_budget(*request.time_budget_ms);
+  check_choices(request);
+  if (size.num_rays() > abilities.most_rays) {
+    throw Error("{}x{} pixels have more than the {} rays that the renderer was made for",
+                size.width, size.height, abilities.most_rays);
+  }
+  const auto need = [](bool is_asked, bool is_able, const char *text) {
+    if (is_asked && !is_able) throw Error("{}", text);
+  };
+  need(request.voxel_pixels > 0, abilities.levels,
+       "this renderer draws the finest level of detail alone: leave out voxel_pixels, or draw on a "
+       "device by a renderer that was made with_levels");
+  need(request.voxel_error > 0, abilities.fewer_planes,
+       "this renderer decodes all bit planes: leave out voxel_error, or draw on a device");
+  need(request.bound != FieldBound::kNone, abilities.bounds,
+       "this renderer draws no bounds of the field: leave out bound, or draw on a device by a "
+       "renderer that was made with_bounds");
+  need(request.ambient_rays != 0, abilities.given_rays,
+       "ambient rays need a renderer that was made with_rays");
+  need(request.max_surface_error.has_value(), abilities.surface_error,
+       "this renderer knows no bounds of the error: leave out max_surface_error, or draw on a "
+       "device "
+       "by a renderer that was made with_bounds");
+  need(request.time_budget_ms.has_value(), abilities.time_budget,
+       "this renderer keeps no time: leave out time_budget_ms, or draw on a device by a renderer "
+       "that was made with_time_budget");
+}
+
+void Renderer::keep_picture() {
+  throw std::logic_error("a renderer without Abilities::kept_picture keeps none");
+}
+
+void Renderer::fill_from_kept() {
+  throw std::logic_error("a renderer without Abilities::kept_picture keeps none");
+}
+
+void Renderer::enlarge_kept(const FrameRequest &) {
+  throw std::logic_error("a renderer without Abilities::kept_picture keeps none");
+}
+
+}  // namespace isowave::core

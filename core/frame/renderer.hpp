@@ -1,0 +1,161 @@
+#pragma once
+// A renderer turns a request into a picture. A device, the host, a team of processes and the scalar
+// twin are renderers: the same request gives the same bits. What can be added to any of them, a
+// time budget or a bound of the error, is a renderer around another (RendererAround).
+
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/base/team.hpp"
+#include "core/frame/appearance.hpp"
+#include "core/frame/frame_request.hpp"
+#include "core/frame/solvers.hpp"
+#include "core/view/given_rays.hpp"
+
+namespace isowave::core {
+
+/// What requests may ask of a renderer, beside a picture of full detail.
+struct Abilities {
+  ImageSize largest{};  ///< picture of a request without a size
+  std::uint64_t most_rays = std::numeric_limits<std::uint64_t>::max();  ///< of a frame
+  bool levels = false;             ///< FrameRequest::voxel_pixels
+  bool fewer_planes = false;       ///< FrameRequest::voxel_error
+  bool bounds = false;             ///< FrameRequest::bound
+  bool given_rays = false;         ///< FrameRequest::ambient_rays, and cast_rays()
+  bool cells = true;               ///< hits say in which cell they are: HitRecord::block_id
+  bool surface_error = false;      ///< FrameRequest::max_surface_error
+  bool time_budget = false;        ///< FrameRequest::time_budget_ms
+  bool kept_picture = false;       ///< keep_picture() and what goes with it
+  Solver solver = kDefaultSolver;  ///< finds the hits
+};
+
+/// Throws  Error: the request is out of range, or asks for what the abilities do not have
+void check(const FrameRequest &request, const Abilities &abilities);
+
+/// Throws  Error unless it is finite and above 0
+void check_max_surface_error(double max_surface_error);
+/// Throws  Error unless it is finite and above 0
+void check_time_budget(double budget_ms);
+
+/// The size of the request's picture.
+inline ImageSize size_of(const FrameRequest &request, const Abilities &abilities) {
+  return request.size.value_or(abilities.largest);
+}
+
+/// Not thread-safe. Of a team's renderers, all make the same calls in the same order.
+class Renderer {
+ public:
+  virtual ~Renderer() = default;
+  Renderer(const Renderer &) = delete;
+  Renderer &operator=(const Renderer &) = delete;
+
+  virtual Abilities abilities() const = 0;
+  /// The processes that draw the picture together: this one, unless said otherwise.
+  virtual Team &team() { return alone_; }
+  /// Grids of the whole volume's levels of detail that requests may use, the finest first.
+  virtual std::vector<VolumeInfo> levels() const = 0;
+
+  /// Draws one frame, and waits for it.
+  ///
+  /// Throws  Error: what check() refuses; a degenerate camera; a NaN isovalue. The next frame is
+  /// not
+  ///         affected
+  virtual FrameStats render(const FrameRequest &request) = 0;
+
+  /// The first hit of each ray, in the finest level of detail. t counts in lengths of the ray's
+  /// direction. Leaves the picture of the last frame as it is.
+  ///
+  /// Throws  Error: no ability for given rays; what make_index_rays() throws; the isovalue is NaN
+  virtual std::vector<HitRecord> cast_rays(std::span<const WorldRay> rays, float isovalue,
+                                           Normals normals) = 0;
+
+  /// A view in which isosurfaces fill a picture of that size, see surface_camera(); no size: of the
+  /// largest.
+  ///
+  /// Throws  Error: an isovalue is NaN
+  virtual Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {}) = 0;
+
+  // The last frame, or within on_pass the frame at work. A team's rank 0 gets it, other ranks get
+  // empty ones. All throw Error if no frame was drawn, and wait.
+
+  virtual ImageSize size() const = 0;
+  /// RGB [size.height][size.width], row 0 at the top.
+  virtual Image8 shade(const Appearance &appearance = {}) = 0;
+  /// [size.ray_rows()][size.ray_columns()], row 0 at the top.
+  virtual std::vector<HitRecord> hits() = 0;
+  /// Distances from the eye [world units], as hits().
+  virtual std::vector<float> depth() { return depth_of(hits()); }
+  /// Rays that hit, of the frame with those statistics.
+  virtual std::uint64_t num_hits(const FrameStats &stats) { return stats.rays_hit; }
+
+  // Pictures of one frame with more and more pixels (timed_renderer.hpp), for renderers with
+  // Abilities::kept_picture. The others throw std::logic_error.
+
+  /// Puts the last frame's picture aside: of at most half the pixels of the largest, along each
+  /// axis, rounded up (halved()).
+  virtual void keep_picture();
+  /// The rays of the last frame without a hit show the kept picture's, as after a frame that was
+  /// cancelled. Waits.
+  virtual void fill_from_kept();
+  /// The kept picture, of the same request, becomes the last frame's, with as many pixels as the
+  /// request says. Waits.
+  virtual void enlarge_kept(const FrameRequest &request);
+
+  /// Forgets all decoded blocks, so that the next frame is a cold one: for measurements. No picture
+  /// depends on it.
+  virtual void clear_cache() = 0;
+  /// Memory that the renderer holds: of its device, if it has one [bytes].
+  virtual std::uint64_t memory_bytes() const = 0;
+  virtual double setup_ms() const { return 0; }  ///< wall clock of making it, without compiling
+
+ protected:
+  Renderer() = default;
+
+ private:
+  TeamOfOne alone_;
+};
+
+/// A renderer that hands on to another all but what a class derived from this overrides.
+class RendererAround : public Renderer {
+ public:
+  /// inner: must outlive this
+  explicit RendererAround(Renderer &inner) : inner_(inner) {}
+  explicit RendererAround(std::unique_ptr<Renderer> inner)
+      : owned_(std::move(inner)), inner_(*owned_) {}
+
+  Abilities abilities() const override { return inner_.abilities(); }
+  Team &team() override { return inner_.team(); }
+  std::vector<VolumeInfo> levels() const override { return inner_.levels(); }
+  FrameStats render(const FrameRequest &request) override { return inner_.render(request); }
+  std::vector<HitRecord> cast_rays(std::span<const WorldRay> rays, float isovalue,
+                                   Normals normals) override {
+    return inner_.cast_rays(rays, isovalue, normals);
+  }
+  Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {}) override {
+    return inner_.camera(isovalues, size);
+  }
+  ImageSize size() const override { return inner_.size(); }
+  Image8 shade(const Appearance &appearance = {}) override { return inner_.shade(appearance); }
+  std::vector<HitRecord> hits() override { return inner_.hits(); }
+  std::vector<float> depth() override { return inner_.depth(); }
+  std::uint64_t num_hits(const FrameStats &stats) override { return inner_.num_hits(stats); }
+  void keep_picture() override { inner_.keep_picture(); }
+  void fill_from_kept() override { inner_.fill_from_kept(); }
+  void enlarge_kept(const FrameRequest &request) override { inner_.enlarge_kept(request); }
+  void clear_cache() override { inner_.clear_cache(); }
+  std::uint64_t memory_bytes() const override { return inner_.memory_bytes(); }
+  double setup_ms() const override { return inner_.setup_ms(); }
+
+ protected:
+  Renderer &inner() const { return inner_; }
+
+ private:
+  std::unique_ptr<Renderer> owned_;
+  Renderer &inner_;
+};
+
+}  // namespace isowave::core

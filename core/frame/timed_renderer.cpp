@@ -1,0 +1,150 @@
+#include "core/frame/timed_renderer.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "core/base/error.hpp"
+
+namespace isowave::core {
+
+namespace {
+
+/// Pixels of a step for each of the step before.
+constexpr double kGrowth = 4;
+
+/// Adds what a step did to what the steps before did.
+void add(FrameStats &sum, FrameStats step) {
+  step.passes.insert(step.passes.begin(), sum.passes.begin(), sum.passes.end());
+  step.normals += sum.normals;
+  step.ambient += sum.ambient;
+  step.uploaded_blocks += sum.uploaded_blocks;
+  step.uploaded_bytes += sum.uploaded_bytes;
+  step.steps = std::move(sum.steps);
+  sum = std::move(step);
+}
+
+/// A step is as complete as the rank that has got least far.
+double least_percent(Team &team, double percent) {
+  return std::ranges::min(gather(team, std::vector{percent}));
+}
+
+}  // namespace
+
+double TimedRenderer::steady_clock_ms() {
+  return std::chrono::duration<double, std::milli>(
+             std::chrono::steady_clock::now().time_since_epoch())
+      .count();
+}
+
+void TimedRenderer::check_keeps_picture() const {
+  if (!inner().abilities().kept_picture)
+    throw Error("no frame can be drawn within a time: the renderer was made to keep no picture");
+}
+
+Abilities TimedRenderer::abilities() const {
+  Abilities abilities = inner().abilities();
+  abilities.time_budget = true;
+  return abilities;
+}
+
+/// All ranks must decide alike.
+double TimedRenderer::now_ms() {
+  return of_first(team(), std::vector{now_()}).front();
+}
+
+FrameStats TimedRenderer::render(const FrameRequest &request) {
+  if (!request.time_budget_ms) return inner().render(request);
+  core::check(request, abilities());
+  check_can_keep(request);
+  const double begin = now_ms(), end = begin + *request.time_budget_ms;
+  FrameStats sum;
+  std::size_t step = kNumSteps - 1;
+  for (double step_begin = begin;;) {
+    const bool is_first = sum.steps.empty();
+    Drawn drawn = draw_step(request, step, is_first, step_begin, end);
+    const FrameStats &stats = drawn.stats;
+    const bool is_whole = !stats.cancelled,
+               has_all_hits = stats.passes.back().counts.next_active_count == 0;
+    const double now = now_ms(), step_ms = now - step_begin;
+    const FrameRequest of_step = request_of(request, step);
+    sum.steps.push_back({*of_step.size, of_step.voxel_pixels, step_ms,
+                         least_percent(team(), stats.passes.back().completed_percent),
+                         stats.cancelled});
+    if (!drawn.is_stopped) last_ms_[step] = is_whole ? step_ms : 2 * step_ms;
+    if (!has_all_hits && !is_first) fill_from_kept();
+    add(sum, std::move(drawn.stats));
+    sum.cancelled = drawn.is_stopped;
+    sum.complete = is_whole && step == 0;
+    if (step == 0) break;
+    keep_picture();
+    if (drawn.is_stopped) break;
+    const std::size_t next =
+        is_whole ? next_step(step, step_ms, drawn.first_pass_ms, end - now) : step;
+    if (next == step) break;
+    step = next;
+    step_begin = now;
+  }
+  if (step != 0) enlarge_kept(request);
+  sum.total_ms = now_ms() - begin;
+  return sum;
+}
+
+/// Draws a step; the first one to its end, the others until the time is over.
+TimedRenderer::Drawn TimedRenderer::draw_step(const FrameRequest &request, std::size_t step,
+                                              bool is_first, double begin_ms, double end_ms) {
+  Drawn drawn;
+  FrameRequest in_time = request_of(request, step);
+  double pass_begin = begin_ms;
+  // Further passes have fewer rays, so the next one mostly takes no longer than the last.
+  in_time.on_pass = [&](const PassStats &pass) {
+    const double now = now_ms(), pass_ms = now - pass_begin;
+    if (drawn.first_pass_ms == 0) drawn.first_pass_ms = pass_ms;
+    drawn.is_stopped = request.on_pass && !request.on_pass(pass);
+    pass_begin = now;
+    return !drawn.is_stopped && (is_first || now + pass_ms <= end_ms);
+  };
+  drawn.stats = inner().render(in_time);
+  return drawn;
+}
+
+/// Throws Error before anything is drawn.
+void TimedRenderer::check_can_keep(const FrameRequest &request) const {
+  const Abilities can = abilities();
+  const ImageSize full = size_of(request, can);
+  const std::uint64_t most = halved(can.largest, 1).num_rays();
+  if (halved(full, 1).num_rays() > most) {
+    throw Error("half of {}x{} pixels cannot be kept: the renderer keeps a picture of {} rays",
+                full.width, full.height, most);
+  }
+}
+
+/// The frame with fewer rays, and levels of detail that suffice for them.
+FrameRequest TimedRenderer::request_of(const FrameRequest &request, std::size_t step) const {
+  const Abilities can = abilities();
+  const ImageSize full = size_of(request, can);
+  const double scale = std::ldexp(1.0, static_cast<int>(step)) / full.samples;  // of its pixels
+  FrameRequest smaller = request;
+  smaller.time_budget_ms.reset();
+  smaller.size = halved(full, static_cast<unsigned>(step));
+  if (step != 0 && can.levels) smaller.voxel_pixels = std::max(1.0, request.voxel_pixels / scale);
+  if (step != 0) smaller.ambient_rays = 0;
+  return smaller;
+}
+
+/// After a step that took step_ms, and its first pass first_pass_ms: the step to draw in left_ms,
+/// or `step` if there is no time.
+std::size_t TimedRenderer::next_step(std::size_t step, double step_ms, double first_pass_ms,
+                                     double left_ms) const {
+  std::size_t next = step;
+  double expected = step_ms;
+  for (std::size_t finer = step; finer-- > 0;) {
+    expected = last_ms_[finer] > 0 ? last_ms_[finer] : kGrowth * expected;
+    if (expected <= left_ms) next = finer;
+  }
+  // Part of a better picture is better than none.
+  if (next == step && step > 0 && kGrowth * first_pass_ms <= left_ms) next = step - 1;
+  return next;
+}
+
+}  // namespace isowave::core

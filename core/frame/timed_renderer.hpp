@@ -1,0 +1,72 @@
+#pragma once
+// Frames within a time: first a small picture with coarse levels of detail, then larger and finer
+// ones, as long as there is time. What is drawn depends on timings, unlike everything else in
+// isowave; a whole picture is there however short the time.
+
+#include <array>
+#include <functional>
+
+#include "core/frame/renderer.hpp"
+
+namespace isowave::core {
+
+/// Draws frames with a time budget by a renderer that can keep a picture, in steps: 1/8, 1/4, 1/2
+/// of the rays along each axis, then all of them as the request says. Pictures of fewer rays have
+/// one for each pixel. If the renderer has levels of detail, smaller pictures use those whose
+/// voxels are at most one of their pixels apart. Requests without a budget are handed on.
+class TimedRenderer : public RendererAround {
+ public:
+  using Clock = std::function<double()>;  ///< [ms]
+
+  /// now: for tests. A team takes rank 0's time.
+  ///
+  /// Throws  Error: the renderer was made to keep no picture
+  explicit TimedRenderer(Renderer &inner, Clock now = steady_clock_ms)
+      : RendererAround(inner), now_(std::move(now)) {
+    check_keeps_picture();
+  }
+  explicit TimedRenderer(std::unique_ptr<Renderer> inner, Clock now = steady_clock_ms)
+      : RendererAround(std::move(inner)), now_(std::move(now)) {
+    check_keeps_picture();
+  }
+
+  Abilities abilities() const override;
+
+  /// Draws the smallest picture, however long it takes, then the largest that is expected to be
+  /// whole in time, by what steps took in the frame before, and so on. A picture that is not whole
+  /// in time is filled from the one before. The hit buffer holds a picture of the full size. The
+  /// request's on_pass is called after each pass, while the renderer has a picture of the step's
+  /// size; if it returns false, the frame ends there, even in the smallest picture.
+  ///
+  /// Returns  the statistics of all steps; rays_hit is the last step's, cancelled says whether
+  ///          on_pass stopped the frame
+  /// Throws   Error: half of the picture is larger than what the renderer keeps
+  FrameStats render(const FrameRequest &request) override;
+
+  static double steady_clock_ms();
+
+ private:
+  static constexpr std::size_t kNumSteps = 4;  ///< 1/8 to 1/1; steps count down to 0, all rays
+
+  /// One step's frame, and what decides about the next step.
+  struct Drawn {
+    FrameStats stats;
+    double first_pass_ms = 0;
+    bool is_stopped = false;
+  };
+
+  void check_keeps_picture() const;
+  void check_can_keep(const FrameRequest &request) const;
+  double now_ms();
+  FrameRequest request_of(const FrameRequest &request, std::size_t step) const;
+  Drawn draw_step(const FrameRequest &request, std::size_t step, bool is_first, double begin_ms,
+                  double end_ms);
+  std::size_t next_step(std::size_t step, double step_ms, double first_pass_ms,
+                        double left_ms) const;
+
+  Clock now_;
+  /// What each step took when it was drawn last; 0: unknown.
+  std::array<double, kNumSteps> last_ms_{};
+};
+
+}  // namespace isowave::core

@@ -1,0 +1,39 @@
+#include "core/paper/intersect.hpp"
+
+#include "core/stages/solver_defines.hpp"
+
+namespace isowave::core {
+
+namespace {
+
+ocl::Defines intersect_defines(std::uint32_t group_size, Solver solver, ClosestHit closest) {
+  ocl::Defines defines = group_defines(group_size);
+  defines.merge(solver_defines(solver));
+  defines.merge(closest_defines(closest));
+  return defines;
+}
+
+}  // namespace
+
+Intersect::Intersect(ocl::Device &device, std::uint64_t num_rays, std::uint32_t group_size,
+                     Solver solver, ClosestHit closest)
+    : range_(ocl::Range::strided(num_rays, group_size, device).in_parts(num_rays, device)),
+      kernel_(device, "intersect", "intersect", intersect_defines(group_size, solver, closest)) {
+  if (solver.kind == ISO_SOLVER_BERNSTEIN) {
+    settle_doubts_.emplace(device, "intersect", "settle_doubts",
+                           intersect_defines(group_size, solver, closest));
+  }
+}
+
+void Intersect::operator()(const BlockCache &cache, const BlockGroups &groups, Wavefront &rays) {
+  kernel_(range_, rays.frame, range_.parts, rays.counts, groups.pair_ids, groups.block_rays,
+          rays.pair_block_ids, cache.table, cache.values, rays.active_ray_ids, rays.pair_rays,
+          rays.pair_hits, rays.closest_pairs);
+  if (settle_doubts_) {
+    (*settle_doubts_)(range_, rays.frame, range_.parts, rays.counts, groups.pair_ids,
+                      rays.pair_block_ids, cache.table, cache.values, rays.active_ray_ids,
+                      rays.pair_rays, rays.pair_hits, rays.closest_pairs);
+  }
+}
+
+}  // namespace isowave::core

@@ -1,0 +1,125 @@
+#pragma once
+// Draws isosurfaces as triangles: Block-Compressed Marching Cubes (Usher and Pascucci, LDAV 2020),
+// the rival that the ray pipelines are measured against, on the same stages, cache and hit buffer.
+//
+//   new isovalue  active blocks -> [ request -> cache -> decode ]* -> count -> prefix sum -> write
+//   each frame    mesh -> rasterise -> hits -> picture
+//
+// Without a budget, cache and mesh grow to what the surface needs, as published. Within a budget
+// that is too small for that, each frame goes through the surface in batches and keeps no mesh:
+//
+//   each frame    active blocks -> [ request -> cache -> decode -> count -> prefix sum
+//                                    -> [ write -> rasterise ]* ]* -> hits -> picture
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/extract/surface_blocks.hpp"
+#include "core/paper/block_triangles.hpp"
+#include "core/paper/rasterise.hpp"
+#include "core/stages/prefix_sum.hpp"
+#include "core/stages/shade.hpp"
+#include "core/view/camera.hpp"
+
+namespace isowave::core {
+
+struct MeshRendererOptions {
+  ImageSize size{};                         ///< the largest picture
+  std::uint64_t memory_budget = 0;          ///< bound on all device memory [bytes]; 0: it may grow
+  StreamPlace stream = StreamPlace::kAuto;  ///< where the compressed volume is
+};
+
+/// What a frame took.
+struct MeshFrameStats {
+  bool is_new_surface = false;      ///< the blocks of the isovalue were found in this frame
+  bool is_kept = false;             ///< the mesh stays on the device, for the next frame
+  std::uint64_t listed_blocks = 0;  ///< whose cells the surface may pass
+  std::uint64_t needed_blocks = 0;  ///< these and the neighbours that they need
+  std::uint64_t cached_blocks = 0;  ///< blocks in the cache, of other isovalues, too
+  std::uint64_t decoded_blocks = 0;
+  std::uint32_t cache_slots = 0;
+  std::uint64_t num_triangles = 0;
+  std::uint32_t num_parts = 0;     ///< that the mesh was drawn in
+  std::uint64_t device_bytes = 0;  ///< of all buffers
+  double surface_ms = 0;  ///< until the mesh was there; 0 where it is not kept, or was there
+  double draw_ms = 0;     ///< the rest
+  double total_ms = 0;    ///< wall clock, from camera to finished hit buffer on the device
+};
+
+/// Not thread-safe, as the device.
+class MeshRenderer {
+ public:
+  /// Uploads the volume and builds its macrocell ranges.
+  ///
+  /// device  must outlive the renderer; volume, too
+  /// Throws  Error: options out of range, the device's memory or the budget does not suffice
+  /// Waits   yes
+  MeshRenderer(ocl::Device &device, const CompressedVolume &volume,
+               const MeshRendererOptions &options);
+
+  /// Draws one frame. Its hits have the same bits on every device and with every budget. They
+  /// differ from those of the ray pipelines as triangles do from the trilinear surface; gradients
+  /// are the triangles' normals, directions alone.
+  ///
+  /// size    none: the renderer's largest
+  /// Throws  Error: the size or the isovalue is out of range, a budget that is too small, a surface
+  ///         that is too large for the device
+  /// Waits   yes
+  MeshFrameStats render(const Camera &camera, float isovalue, std::optional<ImageSize> size = {});
+
+  /// Returns  the hit buffer of the last frame, as DeviceRenderer::hits()
+  /// Throws   Error: no frame was drawn
+  /// Waits    yes
+  std::vector<HitRecord> hits();
+  /// Returns  the picture of the hit buffer, as DeviceRenderer::shade()
+  Image8 shade(const Appearance &appearance = {});
+
+  /// Forgets the mesh and all decoded blocks, so that the next frame is a cold one: for
+  /// measurements. Their memory stays.
+  void clear_cache();
+
+ private:
+  /// Of the surface at hand, on the device.
+  struct Lists {
+    Lists(ocl::Device &device, std::uint64_t num_listed);
+    static ocl::BufferSizes sizes(std::uint64_t num_listed);
+
+    ocl::Buffer<uint> block_ids;  ///< [listed]
+    ocl::Buffer<uint> offsets;    ///< [listed + 1] counts of triangles; then prefix sums
+    PrefixSum sum;
+  };
+
+  void drop_all();
+  void find_surface(float isovalue);
+  void make_lists();
+  void plan_within_budget();
+  void bring_all();
+  std::uint64_t count_all();
+  void make_mesh(std::uint64_t num_triangles);
+  void draw_batches();
+  std::uint64_t list_bytes() const { return Lists::sizes(num_listed_).bytes(); }
+  std::uint64_t mesh_bytes() const;
+  std::uint64_t bytes_in_use() const;
+
+  ocl::Device &device_;
+  MeshRendererOptions options_;
+  VolumeInfo info_;
+  SurfaceBlocks blocks_;
+  BlockTriangles block_triangles_;
+  Rasterise rasterise_;
+  Shade shade_;
+  std::optional<Lists> lists_;
+  std::optional<ocl::Buffer<BlockVertex>> mesh_;  ///< of the surface, or of a part of it
+  FrameParams frame_{};                           ///< of the picture
+  ImageSize size_;
+  std::optional<float> isovalue_;  ///< of the surface at hand; none: there is none
+  std::uint32_t num_listed_ = 0;
+  std::uint64_t num_needed_ = 0, num_triangles_ = 0;
+  bool is_kept_ = false;  ///< mesh_ has all triangles
+  std::uint32_t num_parts_ = 0;
+  bool has_picture_ = false;
+};
+
+}  // namespace isowave::core

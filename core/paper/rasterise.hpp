@@ -1,0 +1,55 @@
+#pragma once
+// Triangles -> hit buffer (kernels_cl/paper/rasterise.cl): what Block-Compressed Marching Cubes has
+// drawn by the graphics pipeline, as OpenCL kernels, with the same bits on every device.
+
+#include "core/ocl/kernel.hpp"
+#include "core/stages/wavefront.hpp"
+#include "core/view/frame.hpp"
+#include "kernels_cl/portable/raster.h"
+
+namespace isowave::core {
+
+/// What drawing triangles needs of a view.
+RasterView make_raster_view(const View &view);
+
+class Rasterise {
+ public:
+  static ocl::BufferSizes sizes(std::uint64_t num_rays);
+  Rasterise(ocl::Device &device, std::uint64_t num_rays);
+
+  /// Begins a picture: no pixel has a hit.
+  ///
+  /// In     rays.frame: its view is used, here and for what follows
+  /// Out    rays.hits
+  /// Waits  no
+  void clear(Wavefront &rays);
+
+  /// Draws the next part of a mesh. A hit is the nearest triangle that the pixel's ray meets; of
+  /// equally near ones the first in the mesh.
+  ///
+  /// vertices  [3 * num_triangles]
+  /// In        rays.frame: its view and grid
+  /// Out       rays.hits; their gradients are directions alone: the triangles' normals
+  /// Throws    std::invalid_argument: there are not so many vertices
+  /// Waits     no
+  void operator()(const ocl::Buffer<BlockVertex> &vertices, std::uint32_t num_triangles,
+                  Wavefront &rays);
+
+ private:
+  ocl::Device &device_;
+  ocl::Range pixels_range_;
+  RasterView view_{};
+  ocl::Buffer<uint> depth_, triangles_;  ///< [rays]
+  ocl::Buffer<uint> listed_;             ///< how many large triangles, then these
+  ocl::Kernel<FrameParams, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<HitRecord>> clear_;
+  ocl::Kernel<FrameParams, RasterView, uint, uint, ocl::In<BlockVertex>, ocl::Out<uint>,
+              ocl::Out<uint>, uint, ocl::Out<uint>>
+      part_;
+  ocl::Kernel<FrameParams, RasterView, uint, ocl::In<BlockVertex>, ocl::Out<uint>, ocl::Out<uint>,
+              uint, ocl::In<uint>>
+      list_;
+  ocl::Kernel<FrameParams, RasterView, ocl::In<BlockVertex>, ocl::Out<uint>, ocl::Out<HitRecord>>
+      hits_;
+};
+
+}  // namespace isowave::core

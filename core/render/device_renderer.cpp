@@ -1,0 +1,524 @@
+#include "core/render/device_renderer.hpp"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "core/base/error.hpp"
+#include "core/base/ms_since.hpp"
+#include "core/ocl/in_process.hpp"
+#include "core/render/stall_guard.hpp"
+#include "core/render/surface_camera.hpp"
+#include "core/view/detail.hpp"
+#include "kernels_cl/portable/block_grid.h"
+#include "kernels_cl/portable/window.h"
+
+namespace isowave::core {
+
+namespace {
+
+/// Caches of fewer slots may run out of them within one pass, unless they are made for what a frame
+/// needs (MemoryPlan::can_grow()), or for all blocks.
+constexpr std::uint32_t kSmallCache = 1u << 16;
+/// Slots are scarce where fewer than one of so many are free.
+constexpr std::uint32_t kScarcePart = 8;
+
+/// A frame that freed more slots than these of blocks that it had asked for leaves nothing of use
+/// to the next. What is left of a ray's blocks makes it wait once for each that is gone. To a GPU
+/// such passes cost more than decoding all anew: H100, 512^3, frames that come again take 1.2 ms
+/// with 90,000 slots, 1.4 with 85,000 and 1.9 with 70,000 where blocks are kept, cold ones 1.3.
+/// Where blocks take longer, since a CPU decodes them or they must be uploaded first, more are
+/// worth keeping: PoCL, 80,000 and 65,536 slots, 123 and 138 ms, cold 154 and 146.
+std::uint32_t most_recycled(std::uint32_t num_slots, ocl::DeviceType type, StreamPlace stream) {
+  return num_slots / (type == ocl::DeviceType::kCpu || stream == StreamPlace::kHost ? 2 : 8);
+}
+
+/// Slots that the frame has freed of blocks that it had asked for itself.
+std::uint64_t recycled_blocks(const FrameStats &stats) {
+  std::uint64_t sum = stats.normals.recycled_blocks + stats.ambient.recycled_blocks;
+  for (const PassStats &pass : stats.passes) sum += pass.counts.recycled_count;
+  return sum;
+}
+
+/// Columns of the picture that a list of rays is seen as.
+constexpr std::uint32_t kGivenColumns = 1024;
+
+/// Puts the frame that shading reads back when this goes.
+struct FrameOfPicture {
+  Wavefront &rays;
+  FrameParams frame;
+  ~FrameOfPicture() { rays.frame = frame; }
+};
+
+std::vector<VolumeInfo> infos_of(const std::vector<Level> &levels) {
+  std::vector<VolumeInfo> infos;
+  infos.reserve(levels.size());
+  for (const Level &level : levels) infos.push_back(level.info);
+  return infos;
+}
+
+LaterPasses later_pass(const PassStats &pass) {
+  return {1, pass.counts.decoded_count, pass.counts.recycled_count, 0, pass.stage_ms};
+}
+
+}  // namespace
+
+FrameStats DeviceRenderer::render(const FrameRequest &request) {
+  const auto begin = std::chrono::steady_clock::now();
+  const Uploads before = blocks_.uploads();
+  const bool is_smooth = request.normals == Normals::kSmooth;
+  Frame frame{request.on_pass, request.ambient_rays + (is_smooth ? 1 : 0)};
+  begin_frame(request);
+  frame.stats.first_level = blocks_.drawing.first;
+  frame.stats.last_level = blocks_.drawing.end - 1;
+  const std::pair view(request.camera, request.isovalue);
+  bool &took_one_pass = took_one_pass_[last_view_ == view];
+  last_view_ = view;
+  // If a single pass was enough for the last such frame, normals begin right behind the first.
+  blocks_.counts_touched = in_step(request.on_pass);
+  run(*camera_rays_, frame, is_smooth && took_one_pass ? &normals_of_camera_ : nullptr);
+  blocks_.counts_touched = false;
+  took_one_pass = frame.stats.passes.size() == 1;
+  if (is_smooth) run(normals_of_camera_, frame);
+  if (request.ambient_rays != 0)
+    ambient_->begin(blocks_.levels[blocks_.drawing.first].info, request.ambient_rays);
+  for (std::uint32_t round = 0; round < request.ambient_rays; ++round) cast_round(round, frame);
+  FrameStats &stats = frame.stats;
+  if (request.ambient_rays != 0 && !stats.cancelled) (*ambient_)(rays_, request.ambient_rays);
+  const std::uint64_t recycled = recycled_blocks(stats);
+  if (!stats.cancelled &&
+      recycled > most_recycled(blocks_.cache.num_slots, device_.info().type, options_.stream))
+    blocks_.clear();
+  plan_growth(recycled);
+  rays_.frame = blocks_.levels[0].frame;  // for shading
+  const Uploads after = blocks_.uploads();
+  stats.uploaded_blocks = after.blocks - before.blocks;
+  stats.uploaded_bytes = after.bytes - before.bytes;
+  stats.complete = !stats.cancelled;
+  stats.total_ms = ms_since(begin);
+  return std::move(stats);
+}
+
+/// The passes of one wave, until no ray of it is left, or on_pass says to stop. Does nothing in a
+/// frame that was stopped.
+///
+/// next  the wave that follows, if it may begin behind the first pass, without waiting for the
+///       host. Should this wave need more passes, the next has done nothing.
+void DeviceRenderer::run(Wave &wave, Frame &frame, Wave *next) {
+  if (frame.stats.cancelled) return;
+  const auto begin = std::chrono::steady_clock::now();
+  const bool in_step = this->in_step(frame.on_pass);
+  LaterPasses *sum = wave.sum_in(frame.stats);
+  if (sum != nullptr) --frame.waves_left;
+  StallGuard guard(blocks_.levels[0].info.dims);
+  passes_.begin(wave);
+  if (&wave == camera_rays_.get()) has_picture_ = true;  // the hits of the frame before are gone
+  if (next != nullptr && !in_step) passes_.begin_early(*next);
+  for (bool finished = false; !finished && !frame.stats.cancelled;) {
+    while (passes_.are_read() || (!in_step && passes_.have_room())) passes_.enqueue(wave);
+    PassStats pass = stats_of(passes_.pop());
+    finished = pass.counts.next_active_count == 0;
+    if (sum != nullptr) {
+      *sum += later_pass(pass);
+      pass.completed_percent = 100;
+    } else {
+      if (blocks_.counts_touched) pass.touched_blocks = blocks_.cache.touched_blocks();
+      frame.stats.rays_hit += pass.counts.hit_count;
+      frame.stats.passes.push_back(pass);
+    }
+    const bool more_follows = !finished || frame.waves_left != 0;
+    frame.stats.cancelled = frame.on_pass && !frame.on_pass(pass) && more_follows;
+    guard.check(pass.counts);
+    if (!finished) passes_.take_back_early();
+    if (finished && !passes_.has_early()) blocks_.forget_requests();
+  }
+  if (sum != nullptr) sum->ms += ms_since(begin);
+}
+
+/// Casts one ambient ray of each hit. Until the next round begins, the picture shows the rounds
+/// before this one.
+void DeviceRenderer::cast_round(std::uint32_t round, Frame &frame) {
+  ambient_round_->set_round(round);
+  run(*ambient_round_, frame);
+}
+
+DeviceRenderer::DeviceRenderer(ocl::Device &device, const CompressedVolume &volume,
+                               const RendererOptions &options)
+    : device_(device),
+      setup_begin_(std::chrono::steady_clock::now()),
+      compile_ms_before_(device.compile_ms()),
+      options_(checked(options, volume, device)),
+      plan_(make_plan(device, volume, options_)),
+      blocks_(device, volume, options_, plan_),
+      rays_(device, plan_.limits.rays),
+      value_range_(volume.value_range),
+      size_(options_.size),
+      camera_rays_(options_.pipeline->make_wave(blocks_, rays_, plan_.limits.wave, options_)),
+      smooth_normals_(device, rays_.num_rays, options_.group_size, blocks_.levels.size() > 1),
+      normals_of_camera_(blocks_, rays_, smooth_normals_, RaySource::kCamera),
+      normals_of_given_(blocks_, rays_, smooth_normals_, RaySource::kGiven),
+      shade_(device, options_.size.num_rays()),
+      passes_(device, rays_) {
+  if (plan_.limits.kept_rays != 0) kept_.emplace(device, plan_.limits.kept_rays);
+  if (options_.with_given_rays) {
+    given_rays_.emplace(blocks_, rays_, options_.group_size, options_.solver, RaySource::kGiven);
+    ambient_.emplace(device, rays_.num_rays, blocks_.levels.size() > 1, is_brick());
+    ambient_round_.emplace(blocks_, rays_, *ambient_, *given_rays_);
+  }
+  options_.cache_slots = wanted_slots_ = plan_.cache_slots;
+  is_small_cache_ = plan_.cache_slots < kSmallCache && !plan_.can_grow() &&
+                    plan_.cache_slots < plan_.limits.cache.num_blocks;
+  options_.stream = plan_.stream;
+  options_.window_blocks = plan_.window_blocks;
+  compile_kernels();
+  device.timer().collect();  // what was launched so far belongs to no frame; waits
+  device.finish();
+  ocl::give_back_compiler(device.info());
+  setup_ms_ = ms_since(setup_begin_) - (device.compile_ms() - compile_ms_before_);
+}
+
+/// Launches whatever frames will launch. PoCL and Mesa compile a kernel when it is launched first,
+/// PoCL for each work-group size, and anew for more than 65,535 work-items. So the passes
+/// themselves run, of a frame of one pixel that meets nothing: what is launched here cannot differ
+/// from what frames launch, and all kernels leave by the exits they have for empty lists. Costs no
+/// time that grows with the volume; all that it leaves is one hit, which every frame clears.
+void DeviceRenderer::compile_kernels() {
+  const auto compiling = device_.compiling();
+  Wavefront &rays = rays_;
+  rays.frame = FrameParams{};
+  rays.frame.view.width = rays.frame.view.height = rays.frame.schedule.max_spec_count = 1;
+  rays.frame.schedule.table_groups = blocks_.cache.table_groups;
+  // Frames of one level of detail and of several have kernels of their own.
+  for (std::uint32_t num_levels = 1; num_levels <= std::min<std::size_t>(2, blocks_.levels.size());
+       ++num_levels) {
+    rays.num_level_frames = num_levels;
+    std::vector<Wave *> waves{camera_rays_.get()};
+    if (options_.with_shading) waves.push_back(&normals_of_camera_);
+    if (ambient_round_) waves.push_back(&*ambient_round_);
+    for (Wave *wave : waves) {
+      wave->begin();
+      for (int pass = 0; pass < 2; ++pass) wave->enqueue_pass();  // the first decodes nothing
+      blocks_.forget_requests();
+    }
+  }
+  blocks_.cache.classify(rays);
+  blocks_.cache.count_touched(rays, true);
+  for (Level &level : blocks_.levels)
+    level.decode.compile(level.stream, rays.counts, blocks_.cache);
+  if (options_.with_shading) shade_.compile(rays);
+  if (kept_) kept_->compile(rays);
+  rays.reset_counts();
+}
+
+/// After a frame that has freed so many slots of its own blocks.
+void DeviceRenderer::plan_growth(std::uint64_t recycled) {
+  wanted_slots_ = grown_cache_slots(plan_, recycled);
+}
+
+/// Between frames: a cache of wanted_slots_, without a block. What there was is freed first, so
+/// that the plan is kept. Where the device has not so much memory after all, the cache stays as
+/// large as it was, or becomes smaller, and never grows again; pictures do not depend on it.
+void DeviceRenderer::grow_cache() {
+  if (wanted_slots_ == plan_.cache_slots) return;
+  const std::uint32_t before = plan_.cache_slots;
+  for (std::uint32_t slots = wanted_slots_;;) {
+    try {
+      MemoryPlan plan = resized(plan_, slots);
+      blocks_.resize(plan.limits.cache, rays_);
+      camera_rays_->resize_cache(slots);
+      plan_ = std::move(plan);
+      break;
+    } catch (const Error &) {
+      if (slots == kMinCacheSlots) throw;
+      slots = slots > before ? before : std::max(slots / 2, kMinCacheSlots);
+    }
+  }
+  if (plan_.cache_slots != wanted_slots_) {
+    plan_.most_slots = plan_.cache_slots;
+    is_small_cache_ |= plan_.cache_slots < std::min(before, kSmallCache);
+  }
+  options_.cache_slots = wanted_slots_ = plan_.cache_slots;
+}
+
+Abilities DeviceRenderer::abilities_of(const RendererOptions &options) {
+  Abilities abilities;
+  abilities.largest = options.size;
+  abilities.most_rays = options.size.num_rays();
+  abilities.levels = options.with_levels;
+  abilities.fewer_planes = true;
+  abilities.bounds = options.with_bounds;
+  abilities.given_rays = options.with_given_rays;
+  abilities.kept_picture = options.with_kept_picture;
+  abilities.solver = options.solver;
+  return abilities;
+}
+
+std::vector<VolumeInfo> DeviceRenderer::levels() const {
+  return infos_of(blocks_.levels);
+}
+
+void DeviceRenderer::begin_frame(const FrameRequest &request) {
+  core::check(request, abilities());
+  if (request.ambient_rays != 0 && is_brick())
+    throw Error("a brick's ambient rays go on in other bricks: see TeamRenderer");
+  const ImageSize size = size_of(request, abilities());
+  std::vector<FrameParams> frames = make_level_frames(infos_of(blocks_.levels), request.camera,
+                                                      size, request.isovalue, request.voxel_pixels);
+  const std::vector<DecodedValues> values = decoded_values(request);
+  has_picture_ = false;
+  size_ = size;
+  rays_.num_ambient = 0;
+  open_frame(std::move(frames), values, request.bound, RaySource::kCamera);
+}
+
+/// Opens a frame with a cache of the slots that are wanted.
+void DeviceRenderer::open_frame(std::vector<FrameParams> frames,
+                                const std::vector<DecodedValues> &values, FieldBound bound,
+                                RaySource source) {
+  passes_.drain();  // what the frame before had enqueued beyond its last pass
+  grow_cache();
+  blocks_.open(rays_, std::move(frames), values, bound, source);
+}
+
+PassStats DeviceRenderer::stats_of(const PassCounts &counts) {
+  const double rays = static_cast<double>(size_.num_rays());
+  PassStats stats;
+  stats.counts = counts;
+  stats.counts.window_count = rays_in_window(counts.window_count, counts.active_count);
+  camera_rays_->describe(stats);
+  // A launch that is not needed costs more than a pass that finds slots missing now and then. The
+  // counts are a pass old: its requests have taken slots since, and the pass after it may have
+  // asked for as many.
+  const std::uint64_t spoken_for = 2 * std::uint64_t{counts.requested_count};
+  const std::uint32_t num_slots = blocks_.cache.num_slots;
+  blocks_.slots_are_scarce =
+      is_small_cache_ ||
+      counts.free_count < std::max<std::uint64_t>(num_slots / kScarcePart, spoken_for);
+  stats.completed_percent = 100.0 * (rays - counts.next_active_count) / rays;
+  stats.utilization_percent = 100.0 * counts.granted_count / rays;
+  stats.stage_ms = device_.timer().collect();
+  return stats;
+}
+
+/// What the request makes of each level's blocks. Throws Error where the error is not known that a
+/// bound needs.
+std::vector<DecodedValues> DeviceRenderer::decoded_values(const FrameRequest &request) const {
+  std::vector<DecodedValues> values;
+  for (const Level &level : blocks_.levels) {
+    const double voxel_error = voxel_error_of(request.voxel_error, values.size());
+    const BlockPrecision planes = with_fewer_planes(level.precision, voxel_error);
+    const double few_planes = plane_error(level.precision, voxel_error);
+    const ValueOffset offset = value_offset(level.error, request.bound, few_planes, value_range_);
+    StreamLayout layout = level.stream.layout;
+    layout.min_exponent = planes.min_exponent;
+    layout.whole_numbers = planes.whole_numbers ? 1 : 0;
+    layout.value_offset = offset.uniform;
+    layout.bound_unit = offset.unit;
+    values.push_back({layout, few_planes});
+  }
+  return values;
+}
+
+std::optional<BlockBox> DeviceRenderer::surface_box(std::span<const float> isovalues) {
+  Level &finest = blocks_.levels[0];
+  finest.macrocells.use(static_cast<std::size_t>(FieldBound::kNone));
+  return isowave::core::surface_box(finest.macrocells, finest.info, isovalues);
+}
+
+Camera DeviceRenderer::camera(std::span<const float> isovalues, std::optional<ImageSize> size) {
+  return surface_camera(blocks_.levels[0].info, surface_box(isovalues),
+                        size.value_or(options_.size));
+}
+
+std::vector<HitRecord> DeviceRenderer::cast_rays(std::span<const WorldRay> world_rays,
+                                                 float isovalue, Normals normals) {
+  check_has_given();
+  if (is_brick()) throw Error("rays of any origin go on in other bricks");
+  if (std::isnan(isovalue)) throw Error("the isovalue is NaN: give a number");
+  const std::vector<IndexRay> rays = make_index_rays(blocks_.levels[0].info, world_rays);
+  Wavefront &wavefront = rays_;
+  const FrameOfPicture kept{wavefront, wavefront.frame};
+  // As many as the buffers hold at a time, seen as a picture.
+  const auto columns = static_cast<std::uint32_t>(
+      std::min<std::uint64_t>({kGivenColumns, wavefront.num_rays, rays.size()}));
+  std::vector<HitRecord> hits, part;
+  while (hits.size() < rays.size()) {
+    const std::size_t num_left = rays.size() - hits.size(),
+                      num_rows = std::min((num_left + columns - 1) / columns,
+                                          wavefront.num_rays / columns);
+    const std::span of_part =
+        std::span(rays).subspan(hits.size(), std::min(num_left, num_rows * columns));
+    std::vector<GivenRay> given(num_rows * columns);
+    std::ranges::transform(of_part, given.begin(), &IndexRay::ray);
+    wavefront.given.write(given);
+    open_frame(frames_of_rays(columns, static_cast<std::uint32_t>(num_rows), isovalue),
+               decoded_values({}), FieldBound::kNone, RaySource::kGiven);
+    const OnPass never_stops;
+    Frame frame{never_stops, 1};
+    run(*given_rays_, frame);
+    if (normals == Normals::kSmooth) run(normals_of_given_, frame);
+    plan_growth(recycled_blocks(frame.stats));
+    part.resize(given.size());
+    wavefront.given_hits.read(part);
+    for (std::size_t i = 0; i < of_part.size(); ++i) part[i].t *= of_part[i].t_scale;
+    hits.insert(hits.end(), part.begin(), part.begin() + std::ptrdiff_t(of_part.size()));
+  }
+  return hits;
+}
+
+/// Of all levels: the finest draws given rays, seen as a picture of so many.
+std::vector<FrameParams> DeviceRenderer::frames_of_rays(std::uint32_t columns, std::uint32_t rows,
+                                                        float isovalue) const {
+  std::vector<FrameParams> frames = make_level_grids(infos_of(blocks_.levels));
+  for (FrameParams &frame : frames) {
+    frame.view.width = columns;
+    frame.view.height = rows;
+    frame.view.t_scale = 1;
+    frame.band = {};
+    frame.surface.isovalue = isovalue;
+    frame.screen = {0, 0, columns, rows};
+  }
+  frames.front().band.end_t = std::numeric_limits<float>::infinity();
+  return frames;
+}
+
+void DeviceRenderer::check_has_given() const {
+  if (!given_rays_) throw Error("rays of any origin need a renderer that was made with_rays");
+}
+
+void DeviceRenderer::check_has_picture() const {
+  if (!has_picture_) throw Error("there is no picture: no frame has been drawn");
+}
+
+std::vector<HitRecord> DeviceRenderer::hits() {
+  check_has_picture();
+  std::vector<HitRecord> hits(size_.num_rays());
+  rays_.hits.read(hits);
+  return hits;
+}
+
+void DeviceRenderer::set_hits(std::span<const HitRecord> hits) {
+  check_has_picture();
+  rays_.hits.write(hits);
+}
+
+Image8 DeviceRenderer::shade(const Appearance &appearance) {
+  check_has_picture();
+  return shade_(make_shade_params(blocks_.levels[0].info, appearance), rays_, size_.samples);
+}
+
+std::vector<std::uint32_t> DeviceRenderer::shade_packed(const Appearance &appearance) {
+  check_has_picture();
+  return shade_.packed(make_shade_params(blocks_.levels[0].info, appearance), rays_, size_.samples);
+}
+
+OpenCounts DeviceRenderer::open() const {
+  check_has_picture();
+  OpenCounts open{{}, rays_.num_ambient};
+  if (open.num_ambient == 0) return open;
+  open.counts.resize(size_.num_rays());
+  rays_.open_counts.read(open.counts);
+  return open;
+}
+
+std::vector<HitRecord> DeviceRenderer::placed_hits() {
+  std::vector<HitRecord> hits = this->hits();
+  const bool has_level_ids =
+      blocks_.level_frames->size() > 1 || blocks_.level_frames->front().place.begin_z != 0;
+  for (HitRecord &hit : hits) {
+    if (hit.t == std::numeric_limits<float>::infinity()) continue;
+    std::size_t level = 0;
+    while (has_level_ids &&
+           level_block_of(&(*blocks_.level_frames)[level], hit.block_id) == ISO_INVALID_ID)
+      ++level;
+    const FrameParams &frame = (*blocks_.level_frames)[level];
+    if (has_level_ids) hit.block_id = level_block_of(&frame, hit.block_id);
+    hit = placed_hit(&frame, static_cast<uint>(blocks_.drawing.first + level), hit);
+  }
+  return hits;
+}
+
+void DeviceRenderer::begin_ambient(const FrameRequest &request, std::vector<HitRecord> placed,
+                                   LevelRange levels) {
+  check_has_picture();
+  check_has_given();
+  if (!is_brick()) throw Error("only a brick's frames leave their ambient rays to others");
+  for (HitRecord &hit : placed) hit.cell -= static_cast<uint>(levels.first);
+  set_hits(placed);
+  // A ray stays in the level that has its hit, which this brick need not have drawn.
+  std::vector<FrameParams> frames =
+      make_level_frames(infos_of(blocks_.levels), request.camera, size_, request.isovalue, 0);
+  for (std::size_t level = 0; level < frames.size(); ++level) {
+    const bool may_have_rays = level >= levels.first && level < levels.end;
+    const View &view = frames[level].view;
+    frames[level].screen = {0, 0, view.width, view.height};  // hits are other bricks', too
+    frames[level].band = {.begin_t = 0,
+                          .end_t = may_have_rays ? std::numeric_limits<float>::infinity() : 0};
+  }
+  open_frame(std::move(frames), decoded_values(request), FieldBound::kNone, RaySource::kGiven);
+}
+
+std::vector<std::uint64_t> DeviceRenderer::blocked_rays(std::uint32_t round,
+                                                        std::uint32_t num_rounds,
+                                                        LaterPasses &stats) {
+  rays_.frame = blocks_.level_frames->front();
+  ambient_->begin(blocks_.levels[blocks_.drawing.first].info, num_rounds);
+  const OnPass never_stops;
+  Frame frame{never_stops, 1};
+  cast_round(round, frame);
+  const LaterPasses &passes = frame.stats.ambient;
+  rays_.frame = blocks_.levels[0].frame;  // for shading
+  std::vector<HitRecord> met(size_.num_rays());
+  rays_.given_hits.read(met);
+  std::vector<std::uint64_t> blocked((met.size() + 63) / 64);
+  for (std::size_t ray = 0; ray < met.size(); ++ray) {
+    const bool meets = met[ray].t != std::numeric_limits<float>::infinity();
+    blocked[ray / 64] |= std::uint64_t{meets} << ray % 64;
+  }
+  wanted_slots_ = std::max(wanted_slots_, grown_cache_slots(plan_, passes.recycled_blocks));
+  stats += passes;
+  return blocked;
+}
+
+void DeviceRenderer::set_open(const OpenCounts &open) {
+  check_has_picture();
+  check_has_given();
+  rays_.open_counts.write(open.counts);
+  rays_.num_ambient = open.num_ambient;
+}
+
+KeptPicture &DeviceRenderer::kept() {
+  if (!kept_) throw Error("no picture can be kept: the renderer was made without one");
+  return *kept_;
+}
+
+void DeviceRenderer::keep_picture() {
+  KeptPicture &into = kept();
+  check_has_picture();
+  into.keep(rays_, size_);
+}
+
+void DeviceRenderer::fill_from_kept() {
+  kept().show(rays_, false);
+  device_.finish();
+}
+
+void DeviceRenderer::enlarge_kept(const FrameRequest &request) {
+  core::check(request, abilities());
+  const ImageSize size = size_of(request, abilities());
+  rays_.frame = make_frame_params(blocks_.levels[0].info, request.camera, size, request.isovalue);
+  size_ = size;
+  rays_.num_ambient = 0;
+  kept().show(rays_, true);
+  device_.finish();
+}
+
+void DeviceRenderer::clear_cache() {
+  blocks_.clear();
+  device_.finish();
+}
+
+}  // namespace isowave::core

@@ -1,0 +1,180 @@
+#pragma once
+// Draws isosurfaces of one compressed volume on one device: the main loop of the program.
+//
+// A frame is a row of waves: camera rays, hits that get smooth normals, rounds of ambient rays.
+// run() has the only loop over passes. Waves: ray_waves.hpp, core/paper.
+
+#include <array>
+#include <chrono>
+#include <memory>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "core/frame/renderer.hpp"
+#include "core/render/block_store.hpp"
+#include "core/render/memory_plan.hpp"
+#include "core/render/passes.hpp"
+#include "core/render/ray_waves.hpp"
+#include "core/render/renderer_options.hpp"
+#include "core/stages/ambient.hpp"
+#include "core/stages/kept_picture.hpp"
+#include "core/stages/shade.hpp"
+#include "core/stages/smooth_normals.hpp"
+#include "core/zfp/zfp_stream.hpp"
+
+namespace isowave::core {
+
+class DeviceRenderer : public Renderer {
+ public:
+  /// Uploads the volume, builds its macrocell ranges and every buffer of the frame, and has the
+  /// kernels compiled; nothing is allocated or compiled later.
+  ///
+  /// device   must outlive the renderer
+  /// volume   need not, unless it stays on the host (memory_plan().stream)
+  /// options  capacities: what no request may exceed
+  /// Throws   Error: options out of range, the device's memory or the budget does not suffice
+  /// Waits    yes
+  DeviceRenderer(ocl::Device &device, const CompressedVolume &volume,
+                 const RendererOptions &options);
+
+  /// Draws one frame. Decoded blocks stay in the cache for the next frame, whatever its isovalue,
+  /// unless that asks for other values (voxel_error, bound), or this one needed many more than
+  /// there are slots.
+  ///
+  /// Returns  what the passes did, and how long they took [ms]
+  /// Throws   Error: a request that is out of range or that the renderer was not made for; a file
+  ///          that blocks are read from has become shorter. The next frame is not affected.
+  /// Waits    yes
+  FrameStats render(const FrameRequest &request) override;
+
+  /// What a renderer with such options can draw.
+  static Abilities abilities_of(const RendererOptions &options);
+  Abilities abilities() const override { return abilities_of(options_); }
+  std::vector<VolumeInfo> levels() const override;
+
+  /// The box around the blocks that isosurfaces may be in; none: in no block.
+  ///
+  /// Throws  Error: an isovalue is NaN
+  /// Waits   yes
+  std::optional<BlockBox> surface_box(std::span<const float> isovalues);
+
+  Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {}) override;
+  std::vector<HitRecord> cast_rays(std::span<const WorldRay> rays, float isovalue,
+                                   Normals normals) override;
+
+  std::vector<HitRecord> hits() override;
+  /// Puts other hits in the place of the last frame's: what shade() shows.
+  ///
+  /// hits    [size.ray_rows()][size.ray_columns()]
+  /// Throws  Error: no frame was drawn
+  /// Waits   yes
+  void set_hits(std::span<const HitRecord> hits);
+  Image8 shade(const Appearance &appearance = {}) override;
+  /// The picture of the hit buffer, RGBA in words, red in bits 0..7: A is 0 where no ray of a pixel
+  /// hits.
+  std::vector<std::uint32_t> shade_packed(const Appearance &appearance);
+  /// How open the hits of the last frame are, as far as its ambient rays are through.
+  ///
+  /// Throws  Error: no frame was drawn
+  /// Waits   yes
+  OpenCounts open() const;
+
+  // For bricks, of which pictures are put together (core/bricks): a brick's own frames have no
+  // ambient rays, since these go on in others.
+
+  /// hits() as all bricks can read them, of any level of detail: see placed_hit().
+  std::vector<HitRecord> placed_hits();
+  /// Begins the rounds of ambient rays of a frame that was drawn last and is not cancelled. They
+  /// leave the placed hits of all bricks, in the place of the brick's own.
+  ///
+  /// levels   of detail that draw the frame of the whole volume
+  /// Throws   Error: no frame was drawn; the renderer is not a brick's, or was made without given
+  ///          rays
+  /// Waits    yes
+  void begin_ambient(const FrameRequest &request, std::vector<HitRecord> placed, LevelRange levels);
+  /// Casts a round of them through this brick.
+  ///
+  /// round    0..num_rounds - 1
+  /// Returns  bits [(rays + 63) / 64]: the rays that meet a surface in this brick
+  /// Waits    yes
+  std::vector<std::uint64_t> blocked_rays(std::uint32_t round, std::uint32_t num_rounds,
+                                          LaterPasses &stats);
+  /// What shade() takes for open(). Waits.
+  void set_open(const OpenCounts &open);
+
+  /// These three throw Error without options().with_kept_picture.
+  void keep_picture() override;
+  void fill_from_kept() override;
+  void enlarge_kept(const FrameRequest &request) override;
+
+  void clear_cache() override;
+
+  ImageSize size() const override { return size_; }
+  std::uint64_t memory_bytes() const override { return plan_.total(); }
+  const RendererOptions &options() const { return options_; }  ///< with the defaults filled in
+  const MemoryPlan &memory_plan() const { return plan_; }      ///< every buffer that there is
+  /// The finest level's.
+  const Macrocells &macrocells() const { return blocks_.levels[0].macrocells; }
+  /// Upload and macrocell ranges, without Device::compile_ms().
+  double setup_ms() const override { return setup_ms_; }
+
+ private:
+  /// The frame at work.
+  struct Frame {
+    const OnPass &on_pass;
+    std::uint32_t waves_left;  ///< that follow the one at work
+    FrameStats stats{};
+  };
+
+  void run(Wave &wave, Frame &frame, Wave *next = nullptr);
+  void compile_kernels();
+  void check_has_picture() const;
+  void check_has_given() const;
+  bool is_brick() const { return blocks_.levels[0].info.brick != BrickOf{}; }
+  KeptPicture &kept();
+  void begin_frame(const FrameRequest &request);
+  void open_frame(std::vector<FrameParams> frames, const std::vector<DecodedValues> &values,
+                  FieldBound bound, RaySource source);
+  std::vector<FrameParams> frames_of_rays(std::uint32_t columns, std::uint32_t rows,
+                                          float isovalue) const;
+  std::vector<DecodedValues> decoded_values(const FrameRequest &request) const;
+  PassStats stats_of(const PassCounts &counts);
+  void cast_round(std::uint32_t round, Frame &frame);
+  void plan_growth(std::uint64_t recycled);
+  void grow_cache();
+  bool in_step(const OnPass &on_pass) const {
+    return on_pass || device_.timer().source() != ocl::TimerSource::kOff;
+  }
+
+  ocl::Device &device_;
+  std::chrono::steady_clock::time_point setup_begin_;
+  double compile_ms_before_;
+  RendererOptions options_;
+  MemoryPlan plan_;
+  std::uint32_t wanted_slots_ = 0;  ///< of the cache from the next frame on
+  bool is_small_cache_ = false;     ///< slots may run out within one pass
+  BlockStore blocks_;
+  Wavefront rays_;
+  std::array<float, 2> value_range_;  ///< of the volume before compression
+  ImageSize size_;                    ///< of the frame at work, or the last
+  bool has_picture_ = false;          ///< the hit buffer has the frame's hits so far
+  /// Of the last frame: camera and isovalue.
+  std::optional<std::pair<Camera, float>> last_view_;
+  /// Whether a single pass was enough: for the last frame that showed a new view [0], and for the
+  /// last that showed the same view again [1].
+  std::array<bool, 2> took_one_pass_{};
+  std::unique_ptr<Wave> camera_rays_;
+  SmoothNormals smooth_normals_;
+  SmoothNormalsWave normals_of_camera_, normals_of_given_;
+  Shade shade_;
+  std::optional<KeptPicture> kept_;
+  std::optional<RaysWave> given_rays_;  ///< with given rays; as are
+  std::optional<Ambient> ambient_;
+  std::optional<AmbientRound> ambient_round_;
+  Passes passes_;
+  double setup_ms_ = 0;
+};
+
+}  // namespace isowave::core

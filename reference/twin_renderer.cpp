@@ -1,0 +1,76 @@
+#include "reference/twin_renderer.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "core/base/error.hpp"
+#include "core/base/ms_since.hpp"
+#include "core/host/host_renderer.hpp"
+#include "core/view/detail.hpp"
+
+namespace isowave::core {
+
+Abilities TwinRenderer::abilities() const {
+  Abilities abilities;
+  abilities.largest = largest_;
+  abilities.levels = true;
+  abilities.fewer_planes = true;
+  abilities.bounds = true;
+  abilities.given_rays = true;
+  abilities.solver = solver_;
+  return abilities;
+}
+
+std::vector<VolumeInfo> TwinRenderer::levels() const {
+  return level_infos(volume_, true);
+}
+
+FrameStats TwinRenderer::render(const FrameRequest &request) {
+  check(request, abilities());
+  size_ = size_of(request, abilities());
+  const Decoded wanted{request.voxel_pixels, request.voxel_error, request.bound};
+  if (!twin_ || wanted != decoded_) {
+    twin_.emplace(volume_, request.voxel_pixels, request.voxel_error, request.bound);
+    decoded_ = wanted;
+  }
+  const auto begin = std::chrono::steady_clock::now();
+  frame_ = make_frame_params(volume_.info, request.camera, size_, request.isovalue);
+  hits_ = twin_->render(request.camera, size_, request.isovalue, solver_, request.normals);
+  open_ = {};
+  if (request.ambient_rays != 0)
+    open_ =
+        twin_->open(request.camera, size_, request.isovalue, hits_, request.ambient_rays, solver_);
+  FrameStats stats;
+  stats.rays_hit = static_cast<std::uint64_t>(
+      std::ranges::count_if(hits_, [](const HitRecord &hit) { return std::isfinite(hit.t); }));
+  stats.total_ms = ms_since(begin);
+  if (request.on_pass) {
+    PassStats pass;
+    pass.counts.hit_count = static_cast<uint>(stats.rays_hit);
+    pass.completed_percent = 100;
+    stats.passes.push_back(pass);
+    request.on_pass(pass);
+  }
+  return stats;
+}
+
+std::vector<HitRecord> TwinRenderer::cast_rays(std::span<const WorldRay>, float, Normals) {
+  throw Error("the scalar reference casts no rays of any origin: draw on a device or the host");
+}
+
+Camera TwinRenderer::camera(std::span<const float> isovalues, std::optional<ImageSize> size) {
+  return HostRenderer(volume_).camera(isovalues, size.value_or(largest_));
+}
+
+Image8 TwinRenderer::shade(const Appearance &appearance) {
+  return shade_scalar(frame_, make_shade_params(volume_.info, appearance), hits(), size_.samples,
+                      open_);
+}
+
+std::vector<HitRecord> TwinRenderer::hits() {
+  if (hits_.empty()) throw Error("there is no picture: no frame has been drawn");
+  return hits_;
+}
+
+}  // namespace isowave::core

@@ -1,0 +1,234 @@
+#include "tools/isowave/render_options.hpp"
+
+#include <fmt/format.h>
+
+#include <charconv>
+
+#include "core/base/error.hpp"
+#include "core/frame/ambient_rays.hpp"
+#include "core/frame/renderer.hpp"
+#include "core/io/file_name.hpp"
+#include "core/io/npy.hpp"
+#include "core/io/png.hpp"
+#include "core/view/detail.hpp"
+#include "core/volume/pyramid.hpp"
+#include "tools/isowave/help_groups.hpp"
+#include "tools/isowave/render_stats.hpp"
+#include "tools/isowave/strict_options.hpp"
+
+namespace isowave::core::tools {
+
+namespace fs = std::filesystem;
+
+glm::vec3 parse_color(const char *option, const std::string &text) {
+  std::uint32_t rgb = 0;
+  const char *end = text.data() + text.size();
+  if (text.size() == 7 && text[0] == '#') {
+    const auto parsed = std::from_chars(text.data() + 1, end, rgb, 16);
+    if (parsed.ec == std::errc{} && parsed.ptr == end) {
+      return {float(rgb >> 16) / 255.0f, float(rgb >> 8 & 255u) / 255.0f,
+              float(rgb & 255u) / 255.0f};
+    }
+  }
+  throw Error("{} {}: give a colour as #RRGGBB", option, text);
+}
+
+fs::path frame_path(const fs::path &path, std::size_t num_views, const RenderArgs &options,
+                    double isovalue, std::size_t view) {
+  if (path.empty() || num_views * options.frame.isovalues.size() == 1) return path;
+  fs::path result = path;
+  result.replace_filename(fmt::format("{}_iso{}_view{}{}", path.stem().string(), isovalue, view,
+                                      path.extension().string()));
+  return result;
+}
+
+std::string default_image(const RenderArgs &options, std::size_t num_views) {
+  const std::string stem = volume_stem(options.input);
+  if (num_views * options.frame.isovalues.size() > 1) return stem + ".png";
+  return fmt::format("{}_iso{}.png", stem, options.frame.isovalues.front());
+}
+
+bool asks_for_output(const RenderArgs &options) {
+  for (const std::string *name : {&options.image, &options.depth, &options.stats,
+                                  &options.progress_dir, &options.error_map, &options.refined}) {
+    if (!name->empty()) return true;
+  }
+  return false;
+}
+
+bool asks_for_picture(const RenderArgs &options) {
+  return !options.image.empty() || !options.progress_dir.empty() || !options.refined.empty();
+}
+
+bool chooses_levels(const RenderArgs &options) {
+  return options.max_surface_error ||
+         (options.time_budget && options.renderer_flags.pipeline != "blocks");
+}
+
+namespace {
+
+/// --max-surface-error, --time-budget and what goes with them.
+void check_choice(const RenderArgs &options) {
+  if (!options.max_surface_error && !options.error_map.empty())
+    throw Error("--error-map needs --max-surface-error");
+  if (!options.time_budget && !options.refined.empty())
+    throw Error("--refined needs --time-budget");
+  if (!options.max_surface_error && !options.time_budget) return;
+  const char *choice = options.max_surface_error ? "--max-surface-error" : "--time-budget";
+  if (options.reference) throw Error("--reference cannot choose: leave out {}", choice);
+  if (options.time_budget) check_time_budget(*options.time_budget);
+  if (options.time_budget && !options.progress_dir.empty())
+    throw Error("--time-budget draws a frame in steps: leave out --progress-dir");
+  if (!options.max_surface_error) return;
+  check_max_surface_error(*options.max_surface_error);
+  if (options.time_budget)
+    throw Error("--max-surface-error takes the time it takes: leave out --time-budget");
+  if (options.frame.voxel_error > 0 || options.voxel_pixels > 0)
+    throw Error(
+        "--max-surface-error chooses for itself: leave out --voxel-error and --voxel-pixels");
+}
+
+}  // namespace
+
+void check_options(const CLI::App &command, const RenderArgs &options, const Team &team) {
+  if (team.size() > 1) {
+    refuse_options(command, {"--reference", "--verbose"},
+                   fmt::format("cannot be used with mpirun: {} processes draw parts of the volume",
+                               team.size()));
+  } else {
+    refuse_options(command, {"--bricks"}, "one process draws the whole: start more by mpirun");
+  }
+  if (options.reference && !options.progress_dir.empty())
+    throw Error("--reference has no passes: leave out --progress-dir");
+  if (!asks_for_picture(options)) {
+    refuse_options(command, {"--color", "--background", "--normals", "--ambient"},
+                   "no picture is written: give --output");
+  }
+  if (options.stats.empty())
+    refuse_options(command, {"--no-stage-times"}, "no statistics are written: give --stats");
+  check_renderer_options(command, options.renderer_flags);
+  check_ambient_rays(options.ambient_rays);
+  with_fewer_planes({}, options.frame.voxel_error);  // or throws
+  check_voxel_pixels(options.voxel_pixels);
+  check_choice(options);
+}
+
+Outputs check_outputs(const RenderArgs &options, std::size_t num_views) {
+  Outputs outputs;
+  outputs.read_volume(options.input);
+  if (!options.frame.cameras.empty()) outputs.read(options.frame.cameras);
+  outputs.write("--stats", options.stats);
+  for (const double isovalue : options.frame.isovalues) {
+    for (std::size_t view = 0; view < num_views; ++view) {
+      const auto write = [&](const char *option, const std::string &name) {
+        outputs.write(option, frame_path(name, num_views, options, isovalue, view));
+      };
+      write("--output", options.image);
+      write("--depth", options.depth);
+      write("--error-map", options.error_map);
+      write("--refined", options.refined);
+    }
+  }
+  outputs.write_pictures("--progress-dir", options.progress_dir, "pass");
+  for (const std::string &name : {options.image, options.refined}) check_png_name(name);
+  for (const std::string &name : {options.depth, options.error_map}) check_npy_name(name);
+  check_json_name(options.stats);
+  return outputs;
+}
+
+void check_brick_levels(const RenderArgs &options, const std::vector<VolumeInfo> &levels) {
+  if (levels.size() > 1 || max_levels(levels.front().dims) == 1) return;
+  const CompressionOptions &compression = options.frame.compression;
+  const bool makes_levels =
+      !is_zfp_name(options.input) &&
+      (compression.levels != 1 || (options.max_surface_error && !says_levels(compression)));
+  if (options.voxel_pixels == 0 && !makes_levels) return;
+  throw Error(
+      "{} has no levels of detail, which bricks cannot make: isowave convert --levels all{}",
+      options.input, options.max_surface_error ? ", or do without them: --levels 1" : "");
+}
+
+namespace {
+
+/// Options of every day come first, those of researchers last.
+void group_render_options(CLI::App &command) {
+  group_options(command, "Options of every day",
+                {"--help", "--isovalue", "--output", "--size", "--samples", "--orbit", "--cameras",
+                 "--color", "--background", "--normals", "--ambient", "--device"});
+  group_volume_options(command);
+  group_compression_options(command);
+  group_options(command, "Precision and time",
+                {"--voxel-pixels", "--voxel-error", "--max-surface-error", "--error-map",
+                 "--time-budget", "--refined"});
+  group_options(command, "Memory", {"--memory-budget", "--cache-slots", "--stream", "--verbose"});
+  group_options(command, "Several processes, by mpirun", {"--bricks"});
+  group_options(command, "Further outputs",
+                {"--depth", "--stats", "--no-stage-times", "--progress-dir"});
+  group_options(command, "For researchers",
+                {"--reference", "--pipeline", "--speculation", "--max-speculation", "--solver",
+                 "--grouping", "--closest", "--group-size"});
+}
+
+}  // namespace
+
+void add_render_options(CLI::App &command, RenderArgs &options) {
+  command.add_option("VOLUME", options.input, "a .zfp file, or " + std::string(kVolumeHelp))
+      ->required();
+  add_volume_options(command, options.volume);
+  add_frame_options(command, options.frame)->required();
+  command
+      .add_option("--samples", options.frame.samples,
+                  "N: a pixel is the mean of N x N rays; pixels elsewhere in this list are still "
+                  "the picture's")
+      ->check(CLI::Range(1u, ImageSize::kMaxSamples))
+      ->capture_default_str();
+  command.add_option("--device", options.device,
+                     "device: index, cpu, gpu, or a part of its name (see `isowave devices`); "
+                     "several, with commas: of the first process of a host, the second, ...");
+  command.add_option("--bricks", options.bricks,
+                     "how to cut the volume, one brick per process: XxYxZ bricks along each axis, "
+                     "or active to give each brick the same number of surface blocks [bricks of "
+                     "equal size]");
+  command.add_option("--color", options.color, "surface colour #RRGGBB")->capture_default_str();
+  command.add_option("--background", options.background, "background colour #RRGGBB")
+      ->capture_default_str();
+  add_normals_option(command, options.normals);
+  add_ambient_option(command, options.ambient_rays);
+  command.add_option("--output,-o", options.image,
+                     "PNG; NAME_isoV_viewK.png when there are several frames [VOLUME_isoV.png in "
+                     "the current folder, where no other output is asked for]");
+  command.add_option("--depth", options.depth,
+                     "float32 .npy [H,W]: distance from the eye, inf where nothing is hit; with "
+                     "--samples of each ray");
+  command.add_option(
+      "--max-surface-error", options.max_surface_error,
+      "choose levels of detail and bit planes for each frame, so that its surface is within so "
+      "many pixels of the true one, and say for how many pixels that is certain");
+  command.add_option(
+      "--error-map", options.error_map,
+      "float32 .npy [H,W] of --max-surface-error: the bound of each pixel, or ray, inf "
+      "where there is none");
+  command.add_option(
+      "--time-budget", options.time_budget,
+      "ms for each frame: draws small pictures by coarse levels of detail first, then larger ones, "
+      "as long as there is time");
+  command.add_option("--refined", options.refined,
+                     "PNG of --time-budget: the whole picture, drawn after the other");
+  command.add_option("--stats", options.stats, "JSON statistics of every frame and pass");
+  command.add_flag(
+      "--no-stage-times", options.no_stage_times,
+      "leave ms per stage out of --stats: measuring them makes the host wait after each pass");
+  command.add_flag("--verbose", options.verbose, "print the plan of the device's memory");
+  command.add_option("--progress-dir", options.progress_dir,
+                     "folder for the picture after every pass");
+  add_renderer_options(command, options.renderer_flags);
+  command.add_flag(
+      "--reference", options.reference,
+      "use the scalar C++ reference instead of a device; options of how a device draws are "
+      "then without effect");
+  command.get_option("--orbit")->description(
+      "draw N views around the whole volume [one, which the surfaces fill]");
+  group_render_options(command);
+}
+
+}  // namespace isowave::core::tools

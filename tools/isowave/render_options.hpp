@@ -1,0 +1,65 @@
+#pragma once
+// The options of `render`: what they ask for, what of it cannot be, and the names of its files.
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <filesystem>
+#include <glm/glm.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/base/team.hpp"
+#include "tools/isowave/frame_options.hpp"
+#include "tools/isowave/outputs.hpp"
+#include "tools/isowave/renderer_options.hpp"
+#include "tools/isowave/volume_options.hpp"
+
+namespace isowave::core::tools {
+
+struct RenderArgs {
+  std::string input;
+  VolumeOptions volume;
+  FrameOptions frame;
+  std::string device;
+  RendererFlags renderer_flags;
+  RendererOptions renderer;  ///< what the flags ask for
+  bool reference = false, no_stage_times = false, verbose = false;
+  std::string color = "#DBBD87", background = "#FFFFFF";
+  std::string image, depth, stats, progress_dir, error_map, refined;
+  std::optional<double> max_surface_error;  ///< pixels
+  std::optional<double> time_budget;        ///< ms
+  double voxel_pixels = 0;                  ///< FrameRequest::voxel_pixels
+  std::string normals = "smooth";
+  std::uint32_t ambient_rays = 0;
+  std::string bricks;  ///< XxYxZ, or "active"
+};
+
+void add_render_options(CLI::App &command, RenderArgs &options);
+
+/// "#RRGGBB" -> [0,1]^3.
+glm::vec3 parse_color(const char *option, const std::string &text);
+
+/// The name of a frame's file: the name as given for a single frame, else NAME_isoV_viewK.EXT.
+/// Empty for an empty name.
+std::filesystem::path frame_path(const std::filesystem::path &path, std::size_t num_views,
+                                 const RenderArgs &options, double isovalue, std::size_t view);
+/// VOLUME_iso40.png in the current folder; frame_path() says the rest for several frames.
+std::string default_image(const RenderArgs &options, std::size_t num_views);
+
+/// Whether a file was asked for.
+bool asks_for_output(const RenderArgs &options);
+/// Whether a picture is written.
+bool asks_for_picture(const RenderArgs &options);
+/// Whether levels of detail are chosen among those that the volume has.
+bool chooses_levels(const RenderArgs &options);
+
+/// Throws  Error: what can be told from the options alone
+void check_options(const CLI::App &command, const RenderArgs &options, const Team &team);
+/// Looks at all files before any work. Outputs go to folders that exist, except --progress-dir,
+/// which is made when frames are drawn. Throws Error.
+Outputs check_outputs(const RenderArgs &options, std::size_t num_views);
+/// Throws  Error: bricks would have to make levels of detail. levels: those of the volume
+void check_brick_levels(const RenderArgs &options, const std::vector<VolumeInfo> &levels);
+
+}  // namespace isowave::core::tools

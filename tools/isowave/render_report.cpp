@@ -1,0 +1,142 @@
+#include "tools/isowave/render_report.hpp"
+
+#include <fmt/format.h>
+
+#include <vector>
+
+#include "core/io/npy.hpp"
+#include "core/zfp/describe_compression.hpp"
+#include "tools/isowave/program.hpp"
+#include "tools/isowave/render_stats.hpp"
+
+namespace isowave::core::tools {
+
+namespace {
+
+nlohmann::ordered_json detail_json(const Detail &detail) {
+  return {{"voxel_pixels", detail.voxel_pixels}, {"voxel_error", detail.voxel_error}};
+}
+
+/// What the errors of a volume's voxels and levels come from, and so what bounds rest on.
+std::string_view errors_of(const CompressedVolume &volume) {
+  return volume.errors_are_stated ? "stated" : "measured";
+}
+
+}  // namespace
+
+nlohmann::ordered_json report_steps(const FrameStats &stats, double budget_ms) {
+  nlohmann::ordered_json steps = nlohmann::ordered_json::array();
+  for (const TimedStep &step : stats.steps) {
+    fmt::print("  {}x{}, {}: {:.2f} ms, {}\n", step.size.width, step.size.height,
+               step.voxel_pixels == 0
+                   ? "finest level"
+                   : fmt::format("voxels up to {} of its pixels apart", step.voxel_pixels),
+               step.ms,
+               step.cancelled ? fmt::format("{:.1f} % of it", step.completed_percent) : "whole");
+    steps.push_back({{"size", {step.size.width, step.size.height}},
+                     {"voxel_pixels", step.voxel_pixels},
+                     {"ms", step.ms},
+                     {"completed_percent", step.completed_percent},
+                     {"cancelled", step.cancelled}});
+  }
+  return {{"budget_ms", budget_ms}, {"complete", stats.complete}, {"steps", steps}};
+}
+
+nlohmann::ordered_json report_error(double max_surface_error, const CompressedVolume &volume,
+                                    const DetailChoice &choice, const Certificate &certificate,
+                                    const ImageSize &size, const std::filesystem::path &error_map) {
+  const CertificateSummary summary = summarize(certificate, max_surface_error);
+  const double certified = summary.num_pixels == 0
+                               ? 100.0
+                               : 100.0 * double(summary.num_certified) / double(summary.num_pixels);
+  fmt::print(
+      "  within {} pixels of the true surface{}: {:.2f} % of {} rays (bound: median {:.3g}, p99 "
+      "{:.3g}); {} "
+      "uncertain\n"
+      "  with voxels up to {:.3g} pixels apart and values up to {} off; chosen in {:.0f} ms, "
+      "bounded in "
+      "{:.0f} ms\n",
+      max_surface_error,
+      volume.errors_are_stated ? ", if the errors are right that the file states" : "", certified,
+      with_commas(summary.num_pixels), summary.median, summary.p99,
+      with_commas(summary.num_uncertain), choice.detail.voxel_pixels, choice.detail.voxel_error,
+      choice.total_ms, certificate.total_ms);
+  if (!choice.reachable) {
+    warn(fmt::format("most pixels cannot be kept within {} pixels: {}", max_surface_error,
+                     choice.advice));
+  }
+  if (!error_map.empty())
+    write_npy({size.ray_columns(), size.ray_rows(), certificate.bounds}, error_map);
+  nlohmann::ordered_json tries = nlohmann::ordered_json::array();
+  for (const DetailChoice::Try &each : choice.tries) {
+    tries.push_back(detail_json(each.detail));
+    tries.back()["certified"] = each.certified;
+  }
+  return {{"max_surface_error", max_surface_error},
+          {"errors", errors_of(volume)},
+          {"reachable", choice.reachable},
+          {"chosen", detail_json(choice.detail)},
+          {"tries", tries},
+          {"choice_ms", choice.total_ms},
+          {"pixels", summary.num_pixels},
+          {"certified", summary.num_certified},
+          {"uncertain", summary.num_uncertain},
+          {"median", summary.median},
+          {"p99", summary.p99},
+          {"max", summary.max},
+          {"bound_ms", certificate.total_ms},
+          {"decoded_blocks", certificate.decoded_blocks}};
+}
+
+void print_plan(const MemoryPlan &plan, const CompressedVolume &volume) {
+  fmt::print("the compressed volume of {} bytes stays on the {}: {}\n",
+             with_commas(volume.word_count() * sizeof(std::uint32_t)), to_string(plan.stream),
+             plan.reason);
+  if (plan.stream == StreamPlace::kHost) {
+    fmt::print("its blocks are uploaded through a window, {} at a time\n",
+               with_commas(plan.window_blocks));
+  }
+  for (const ocl::BufferSize &buffer : plan.buffers) {
+    fmt::print("  {:>16} bytes  {}\n", with_commas(buffer.bytes()), buffer.name);
+  }
+  fmt::print("  {:>16} bytes  in all, with {} cache slots; at most {} during setup\n",
+             with_commas(plan.total()), with_commas(plan.cache_slots),
+             with_commas(plan.setup_bytes));
+  if (plan.can_grow()) {
+    fmt::print("  {:>16} bytes  at most, should frames need more slots: with {}\n",
+               with_commas(resized(plan, plan.most_slots).total()), with_commas(plan.most_slots));
+  }
+}
+
+nlohmann::ordered_json options_json(const RenderArgs &options, ImageSize size,
+                                    std::size_t num_views) {
+  nlohmann::ordered_json json = {{"size", {size.width, size.height}},
+                                 {"samples", size.samples},
+                                 {"views", num_views},
+                                 {"isovalues", options.frame.isovalues},
+                                 {"voxel_error", options.frame.voxel_error},
+                                 {"reference", options.reference}};
+  json.update(renderer_options_json(options.renderer));
+  json["voxel_pixels"] = options.voxel_pixels;
+  json["normals"] = options.normals;
+  json["ambient"] = options.ambient_rays;
+  return json;
+}
+
+nlohmann::ordered_json volume_json(const RenderArgs &options, const CompressedVolume &volume) {
+  const VolumeInfo &info = volume.info;
+  return {
+      {"file", options.input},
+      {"dims", {info.dims.x, info.dims.y, info.dims.z}},
+      {"spacing", {info.spacing.x, info.spacing.y, info.spacing.z}},
+      {"type", to_string(info.type)},
+      {"compression", compression_mode(volume)},
+      {"rate", volume.rate()},
+      {"max_voxel_error", volume.max_voxel_error ? nlohmann::ordered_json(*volume.max_voxel_error)
+                                                 : nlohmann::ordered_json()},
+      {"errors", errors_of(volume)},
+      {"blocks", volume.block_count()},
+      {"stream_bytes", volume.word_count() * sizeof(std::uint32_t)}};
+}
+
+}  // namespace isowave::core::tools

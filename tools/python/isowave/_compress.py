@@ -1,0 +1,252 @@
+"""Arrays and files of voxels to volumes."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from isowave import _core
+from isowave._arrays import as_source
+from isowave._checked import flag, number, reversed_axes, whole
+from isowave._volume import Volume, warn_of_file
+
+#: Called with what is done ("compressing") and how much of it, 0 to 1.
+Progress = Callable[[str, float], object]
+
+SUPPORTED_TYPES = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64")
+
+
+def dims_of(shape: Sequence[int]) -> tuple[int, int, int]:
+    try:
+        z, y, x = tuple(shape)
+    except (TypeError, ValueError):
+        raise TypeError(f"shape={shape!r:.60}: give three whole numbers") from None
+    return whole("shape", x), whole("shape", y), whole("shape", z)
+
+
+def compression_options(
+    tolerance: float | None,
+    relative_tolerance: float | None,
+    rate: int | None,
+    exact: bool,
+    levels: int,
+    map_nan: float | None,
+    no_data: float | None,
+    num_threads: int,
+) -> dict[str, Any]:
+    return {
+        "tolerance": None if tolerance is None else number("tolerance", tolerance),
+        "relative_tolerance": (
+            None if relative_tolerance is None else number("relative_tolerance", relative_tolerance)
+        ),
+        "rate": None if rate is None else whole("rate", rate),
+        "exact": flag("exact", exact),
+        "levels": whole("levels", levels),
+        "map_nan": None if map_nan is None else number("map_nan", map_nan),
+        "no_data": None if no_data is None else number("no_data", no_data),
+        "num_threads": whole("num_threads", num_threads),
+        # Where nothing bounds it, the error is measured: people ask.
+        "measure_error": not exact and tolerance is None and relative_tolerance is None,
+    }
+
+
+class TqdmProgress:
+    """A bar of tqdm's for each step."""
+
+    def __init__(self, tqdm: Any) -> None:
+        self.tqdm, self.bar, self.step = tqdm, None, ""
+
+    def __call__(self, what: str, done: float) -> None:
+        if what != self.step:
+            self.close()
+            self.step = what
+            self.bar = self.tqdm(total=100, desc=what, unit="%", leave=False)
+        if self.bar is not None:
+            self.bar.update(int(100 * done) - self.bar.n)
+
+    def close(self) -> None:
+        if self.bar is not None:
+            self.bar.close()
+
+
+def make_progress(progress: bool | Progress | None) -> Progress | None:
+    """None: a bar where tqdm is installed and somebody watches."""
+    if callable(progress):
+        return progress
+    if progress is not None:
+        flag("progress", progress)
+    in_notebook = "ipykernel" in sys.modules
+    if progress is False or (progress is None and not (sys.stderr.isatty() or in_notebook)):
+        return None
+    try:
+        from tqdm.auto import tqdm  # type: ignore[import-untyped,unused-ignore]
+    except ImportError:
+        return None
+    return TqdmProgress(tqdm)
+
+
+def compress(
+    array: Any,
+    *,
+    tolerance: float | None = None,
+    relative_tolerance: float | None = None,
+    rate: int | None = None,
+    exact: bool = False,
+    spacing: Sequence[float] | None = None,
+    origin: Sequence[float] | None = None,
+    direction: npt.ArrayLike | None = None,
+    levels: int = 1,
+    map_nan: float | None = None,
+    no_data: float | None = None,
+    fill_value: float | None = None,
+    path: str | os.PathLike[str] | None = None,
+    progress: bool | Progress | None = None,
+    num_threads: int = 0,
+) -> Volume:
+    """Compresses a three-dimensional array into memory, or into a file.
+
+    Arrays in chunked stores (dask, zarr, h5py, tensorstore, and xarray of these) are read a few
+    layers at a time, each chunk once; meanwhile a temporary file of the array's size keeps them,
+    unless voxels are float32 and nothing is given, or a rate is.
+
+    Parameters
+    ----------
+    array
+        Voxels, axes (z, y, x): numpy and what converts to it, memoryview, xarray, dask, zarr, h5py,
+        tensorstore, SimpleITK, itk, nibabel, pyvista.ImageData.
+    tolerance
+        No voxel is off by more [voxel values].
+    relative_tolerance
+        The same, as a part of the range of values.
+    rate
+        Bits per voxel, 1 to 32.
+    exact
+        Refuse voxels that float32 does not hold. Without tolerance, relative_tolerance and rate,
+        voxels keep all that float32 holds: integers below 2^24 and float32 have no error.
+    spacing, origin
+        World units between voxels, and position of voxel (0, 0, 0); each (z, y, x). What the array
+        says itself (xarray, SimpleITK...) where None, else 1 and 0.
+    direction
+        3 x 3; column a is the unit world direction (x, y, z) of index axis a, in the order x, y, z.
+    levels
+        Levels of detail, the volume itself among them; 0: all that it can have.
+    map_nan
+        What replaces NaN and infinite voxels.
+    no_data
+        Voxels of this value have no data, as NaN voxels have none: no surface touches them. It is
+        compared in the array's own type, and may be infinite; other infinite voxels are refused.
+        If None, what the array says itself: the attributes _FillValue or missing_value of xarray
+        and h5py, the fill value of zarr, h5py and tensorstore unless it is 0.
+    fill_value
+        What replaces masked values of masked arrays; if None, they have no data.
+    path
+        A .zfp file that the volume is written to, layer by layer, and opened from: then the result
+        need not fit into memory. None: into memory.
+    progress
+        True for a bar (needs tqdm), False for none, or a function of (what, done), done from 0 to
+        1. None: a bar on a terminal or in a notebook, where tqdm is installed.
+    num_threads
+        0: one per processor. The result is the same for any number.
+
+    Raises
+    ------
+    Error, TypeError, ValueError
+        What cannot be compressed, in one line.
+    """
+    source = as_source(
+        array,
+        spacing=spacing,
+        origin=origin,
+        direction=direction,
+        fill_value=fill_value,
+    )
+    if no_data is None:
+        no_data = source.no_data
+    options = compression_options(
+        tolerance, relative_tolerance, rate, exact, levels, map_nan, no_data, num_threads
+    )
+    nz, ny, nx = source.shape
+    columns: list[_core.Vector] = [column.tolist() for column in source.direction.T]
+    spacing_xyz, origin_xyz = reversed_axes(source.spacing), reversed_axes(source.origin)
+    grid = (str(source.dtype), (nx, ny, nz), spacing_xyz, origin_xyz, columns)
+    shown = make_progress(progress)
+    try:
+        if path is None and is_plain(array):
+            return Volume(_core.compress_array(array, *grid, options, shown))
+        keep = not isinstance(array, (np.ndarray, memoryview))  # these can be read again at no cost
+        file = None if path is None else os.path.abspath(os.fsdecode(path))
+        return Volume(_core.compress(source.read, *grid, options, keep, file, shown), file)
+    finally:
+        if isinstance(shown, TqdmProgress):
+            shown.close()
+
+
+def is_plain(array: Any) -> bool:
+    """Whether the compiled part can read its memory as it is."""
+    return (
+        type(array) is np.ndarray
+        and array.flags.c_contiguous
+        and array.dtype.isnative
+        and array.dtype.name in SUPPORTED_TYPES
+    )
+
+
+def open(  # noqa: A001: as gzip.open, h5py.File's habit
+    path: str | os.PathLike[str],
+    *,
+    tolerance: float | None = None,
+    relative_tolerance: float | None = None,
+    rate: int | None = None,
+    exact: bool = False,
+    shape: Sequence[int] | None = None,
+    dtype: npt.DTypeLike | None = None,
+    spacing: Sequence[float] | None = None,
+    levels: int = 1,
+    map_nan: float | None = None,
+    no_data: float | None = None,
+    progress: bool | Progress | None = None,
+    num_threads: int = 0,
+) -> Volume:
+    """Opens a volume.
+
+    A ``.zfp`` file stays where it is and is read when it is needed; it must not change. Others are
+    compressed into memory as compress() does: ``.raw`` and ``.raw.gz`` (named
+    ``NAME_XxYxZ_TYPE.raw``, or with shape (z, y, x) and dtype), ``.nrrd``, ``.nhdr``, ``.mha``,
+    ``.mhd``, ``.nii``, ``.nii.gz``, and ``generate:FIELD_XxYxZ_TYPE``.
+
+    spacing, (z, y, x), replaces that of the file.
+
+    Raises
+    ------
+    Error
+        The file is missing, broken or of another kind, in one line.
+    """
+    name = os.fsdecode(path)
+    is_compressed = name.endswith(".zfp")
+    options = compression_options(
+        tolerance, relative_tolerance, rate, exact, levels, map_nan, no_data, num_threads
+    )
+    if is_compressed:
+        options["measure_error"] = False
+    shown = make_progress(progress)
+    try:
+        core = _core.open(
+            name,
+            options,
+            None if shape is None else dims_of(shape),
+            None if dtype is None else np.dtype(dtype).name,
+            None if spacing is None else reversed_axes(spacing),
+            shown,
+        )
+    finally:
+        if isinstance(shown, TqdmProgress):
+            shown.close()
+    warn_of_file(core)
+    if not is_compressed:
+        return Volume(core)
+    return Volume(core, os.path.abspath(name), None if spacing is None else tuple(spacing))

@@ -1,0 +1,99 @@
+"""Pictures, and what they show."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from isowave import _core
+from isowave._checked import flag
+from isowave._request import Request
+
+WHITE = (1.0, 1.0, 1.0)  # the background if none is given, as isowave::Appearance has it
+
+
+class Image:
+    """A picture, and what it shows. Arrays that were not asked for are None.
+
+    Rows go from top to bottom. If each pixel has several rays, depth, normals, position and bounds
+    have `samples` times as many rows and columns: one entry for each ray.
+    """
+
+    rgb: npt.NDArray[np.uint8] | None  #: (height, width, 3)
+    depth: npt.NDArray[np.float32] | None  #: distance from the eye [world units]; inf: no surface
+    normals: npt.NDArray[np.float32] | None
+    """(rows, columns, 3), (x, y, z) in world space, of length 1, away from larger values; 0 where
+    there is no surface."""
+    position: npt.NDArray[np.float32] | npt.NDArray[np.float64] | None
+    """(rows, columns, 3), world space; nan: no surface. float64 if float32 would lose more than
+    1/4096 voxel, as it does far from the origin."""
+    bounds: npt.NDArray[np.float32] | None
+    """How far the surface is from that of the volume before compression, at most [pixels]; inf:
+    nothing is certain. They hold if the volume's errors do, which a file may state wrongly:
+    `statistics["errors_are_stated"]`, as `Volume.errors_are_stated`."""
+
+    def __init__(self, frame: dict[str, Any], request: Request) -> None:
+        assert request.camera is not None
+        self.rgb = frame.get("picture")
+        self.depth = frame.get("depth")
+        self.normals = frame.get("normals")
+        self.position = frame.get("positions")
+        self.bounds = frame.get("bounds")
+        #: What drawing took: passes, rays, hits, decoded_blocks, total_ms and so on.
+        self.statistics: dict[str, Any] = frame["statistics"]
+        self.camera = request.camera
+        self.isovalue = request.isovalue
+        self._samples = request.samples
+        self._background = WHITE if request.background is None else request.background
+
+    @property
+    def complete(self) -> bool:
+        """False if the frame was stopped, or its time was over."""
+        return bool(self.statistics["complete"])
+
+    @property
+    def rgba(self) -> npt.NDArray[np.uint8]:
+        """(height, width, 4); alpha is the part of a pixel that the surface covers.
+
+        Colours are the surface's alone, without the background. Without depth, all is opaque.
+        """
+        rgb = self._rgb()
+        if self.depth is None:
+            return np.dstack((rgb, np.full(rgb.shape[:2], 255, np.uint8)))
+        s = self._samples
+        hit = np.isfinite(self.depth).reshape(rgb.shape[0], s, rgb.shape[1], s)
+        covered = hit.mean(axis=(1, 3))
+        edge = (covered > 0) & (covered < 1)
+        if edge.any():  # there, rays that met nothing have mixed the background in
+            part = covered[edge][:, None]
+            surface = (rgb[edge] - (1 - part) * 255 * np.array(self._background)) / part
+            rgb = rgb.copy()
+            rgb[edge] = np.rint(surface.clip(0, 255))
+        return np.dstack((rgb, np.rint(255 * covered).astype(np.uint8)))
+
+    def _rgb(self) -> npt.NDArray[np.uint8]:
+        if self.rgb is None:
+            raise ValueError("the picture was not asked for: render(..., outputs=('rgb', ...))")
+        return self.rgb
+
+    def __array__(
+        self, dtype: npt.DTypeLike | None = None, copy: bool | None = None
+    ) -> npt.NDArray[Any]:
+        return np.asarray(self.rgba, dtype)
+
+    def _repr_png_(self) -> bytes:
+        return _core.encode_png(self._rgb())
+
+    def save(self, path: str | os.PathLike[str], *, alpha: bool = False) -> None:
+        """Writes a .png file; whole, or not at all.
+
+        alpha: writes `rgba`, transparent where there is no surface, in place of `rgb`.
+        """
+        _core.save_png(self.rgba if flag("alpha", alpha) else self._rgb(), os.fsdecode(path))
+
+    def __repr__(self) -> str:
+        shown = "" if self.rgb is None else f"{self.rgb.shape[1]} x {self.rgb.shape[0]}, "
+        return f"<isowave.Image {shown}isovalue {self.isovalue:g}>"

@@ -1,0 +1,164 @@
+"""The command `isowave view`."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import socket
+import sys
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NoReturn
+
+from isowave._compress import open as open_volume
+
+from . import missing
+from .protocol import MAX_RAYS, first_line
+
+
+def parse_bytes(text: str) -> int:
+    """A number of bytes: 1048576, 600MB, 1GiB. Raises ValueError."""
+    match = re.fullmatch(r"([0-9]+) *(?:([kmgtpe])(i?))?b?", text.strip().lower())
+    if not match:
+        raise ValueError(f"'{text}' is no number of bytes, such as 600MB or 1GiB")
+    number, prefix, binary = match.groups()
+    power = "kmgtpe".index(prefix) + 1 if prefix else 0
+    factor: int = (1024 if binary else 1000) ** power
+    return int(number) * factor
+
+
+def parse_size(text: str) -> tuple[int, int]:
+    """WxH. Raises ValueError."""
+    match = re.fullmatch(r"([1-9][0-9]{0,4})x([1-9][0-9]{0,4})", text)
+    if not match:
+        raise ValueError(f"'{text}' is no size, such as 1920x1080")
+    return int(match[1]), int(match[2])
+
+
+def parse_levels(text: str) -> int:
+    """A number from 1 on, or 0 for "all". Raises ValueError."""
+    if text != "all" and not re.fullmatch("[1-9][0-9]{0,3}", text):
+        raise ValueError(f"'{text}' is no number of levels, such as 3, nor all")
+    return 0 if text == "all" else int(text)
+
+
+def reversed_axes(option: str, values: list[Any] | None) -> tuple[Any, ...] | None:
+    """X Y Z, or one for all, as (z, y, x). Raises ValueError."""
+    if values is None:
+        return None
+    if len(values) not in (1, 3):
+        raise ValueError(f"{option}: need X Y Z, or one for all, got {len(values)} numbers")
+    return tuple(reversed(values if len(values) == 3 else 3 * values))
+
+
+class _Parser(argparse.ArgumentParser):
+    """Says in one line what is wrong, with status 1, as the other commands do."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(1, f"{self.prog}: {message}\n")
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """The command line of `isowave view`."""
+    parser = _Parser(
+        prog="isowave view",
+        description="Shows isosurfaces of a volume in a browser, until Ctrl-C ends it.",
+    )
+    add = parser.add_argument
+    add("volume", help="file of any format that isowave reads, or generate:...")
+    add("-i", "--isovalue", type=float, help="at first")
+    add("--device", help="index, type (gpu, cpu) or a part of the name")
+    add("--memory-budget", type=_argument(parse_bytes), help="of device memory: 600MB, 1GiB")
+    add("--size", type=_argument(parse_size), default=(1920, 1080), help="of the largest picture")
+    add("--rate", type=int, help="bits per voxel [all that float32 holds]")
+    add("--tolerance", type=float, help="each voxel is within this of the input's")
+    add("--tolerance-relative", type=float, help="the same, as a part of the range of values")
+    add("--exact", action="store_true", help="refuse voxels that float32 does not hold")
+    add("--levels", type=_argument(parse_levels), metavar="N|all", help="levels of detail")
+    add("--dims", type=int, nargs="+", help="voxels of a raw file: X Y Z, or N for a cube")
+    add("--type", help="voxel type of a raw file: uint8, int8, ... float32, float64")
+    add("--spacing", type=float, nargs="+", help="world units between voxels: X Y Z, or one")
+    add("--no-data", type=float, help="voxels of this value have no data, as NaN voxels have none")
+    add("--host", default="127.0.0.1", help="to listen at; others than loopback are not encrypted")
+    add("--port", type=int, default=0, help="0: a free one")
+    add("--max-clients", type=int, default=16, help="that look at the same time")
+    add(
+        "--max-rays",
+        type=int,
+        default=MAX_RAYS,
+        help="of a client's picture: pixels x samples x (1 + ambient rays); larger pictures are "
+        "drawn smaller, which the page says [%(default)s]",
+    )
+    add("--no-browser", action="store_true", help="only print the URL")
+    return parser
+
+
+def _argument(parse: Any) -> Any:
+    """argparse shows the text of this error alone."""
+
+    def parsed(text: str) -> Any:
+        try:
+            return parse(text)
+        except ValueError as error:
+            raise argparse.ArgumentTypeError(str(error)) from None
+
+    return parsed
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """The command `isowave view`. Returns its exit status."""
+    try:
+        from .server import serve, wait_and_close
+    except ImportError as error:
+        print(f"isowave view: {missing(error, 'view')}", file=sys.stderr)
+        return 1
+    arguments = make_parser().parse_args(argv)
+    # As the program's other warnings: a line each.
+    warnings.formatwarning = lambda message, *_, **__: f"isowave: warning: {message}\n"
+    try:
+        given = {
+            "rate": arguments.rate,
+            "tolerance": arguments.tolerance,
+            "relative_tolerance": arguments.tolerance_relative,
+            "exact": arguments.exact or None,
+            "levels": arguments.levels,
+            "no_data": arguments.no_data,
+            "shape": reversed_axes("--dims", arguments.dims),
+            "dtype": arguments.type,
+            "spacing": reversed_axes("--spacing", arguments.spacing),
+        }
+        server = serve(
+            open_volume(arguments.volume, **{k: v for k, v in given.items() if v is not None}),
+            title=Path(arguments.volume).name,
+            isovalue=arguments.isovalue,
+            device=arguments.device,
+            memory_budget=arguments.memory_budget,
+            size=arguments.size,
+            max_clients=arguments.max_clients,
+            max_rays=arguments.max_rays,
+            host=arguments.host,
+            port=arguments.port,
+            open_browser=not arguments.no_browser,
+        )
+    except KeyboardInterrupt:
+        return 130
+    except Exception as error:  # of the library, of the socket
+        print(f"isowave view: {first_line(error)}", file=sys.stderr)
+        return 1
+    print(f"{server.url}\nCtrl-C ends it.", flush=True)
+    if "SSH_CONNECTION" in os.environ:
+        way = f"{server.port}:127.0.0.1:{server.port}"
+        print(f"From your machine: ssh -N -L {way} {socket.gethostname()}", flush=True)
+    failure = wait_and_close(server)
+    if failure is not None:
+        print(f"isowave view: {failure}", file=sys.stderr)
+    status = 0 if failure is None else 1
+    if server.scene.is_busy:
+        # A long pass, or a driver that compiles kernels, cannot be stopped, and Python would wait
+        # for its end.
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(status)
+    return status

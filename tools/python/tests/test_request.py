@@ -1,0 +1,127 @@
+"""What a frame is asked for, before the compiled part sees it."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+from typing import Any
+
+import numpy as np
+import pytest
+
+import isowave
+from isowave._request import Request
+
+CAMERA = isowave.Camera((0, 0, 5), (0, 0, 0), (0, 1, 0), 45)
+
+
+def test_its_fields_are_the_arguments_of_render() -> None:
+    fields = [(field.name, field.default) for field in dataclasses.fields(Request)]
+    given = inspect.signature(isowave.Renderer.render).parameters.values()
+    arguments = [(each.name, each.default) for each in given if each.name != "self"]
+    assert fields[0][0] == arguments[0][0] == "isovalue"
+    assert fields[1:] == arguments[1:]
+
+
+def test_arguments_reach_the_request_by_their_names(monkeypatch: pytest.MonkeyPatch) -> None:
+    given: dict[str, Any] = {
+        "camera": CAMERA,
+        "size": (64, 48),
+        "samples": 2,
+        "color": (1.0, 0.5, 0.0),
+        "background": (0.0, 0.5, 1.0),
+        "normals": "cell",
+        "outputs": ("rgb", "bounds"),
+        "max_error": 1.0,
+        "voxel_pixels": 2.0,
+        "voxel_error": 3.0,
+        "time_budget": 4.0,
+        "ambient": 5,
+        "on_pass": print,
+    }
+    assert [*given] == [field.name for field in dataclasses.fields(Request)][1:]
+    monkeypatch.setattr(isowave.Renderer, "draw", lambda self, request: request)
+    request: Any = isowave.Renderer.render(object.__new__(isowave.Renderer), 80, **given)
+    assert {field: getattr(request, field) for field in given} == given
+    assert request.for_core() == {
+        "eye": (0, 0, 5),
+        "at": (0, 0, 0),
+        "up": (0, 1, 0),
+        "fovy_degrees": 45,
+        "isovalue": 80,
+        "width": 64,
+        "height": 48,
+        "samples": 2,
+        "surface": (1, 0.5, 0),
+        "background": (0, 0.5, 1),
+        "smooth_normals": False,
+        "voxel_pixels": 2,
+        "voxel_error": 3,
+        "max_surface_error": 1,
+        "time_budget_ms": 4000,
+        "ambient_rays": 5,
+        "want_picture": True,
+        "want_depth": False,
+        "want_normals": False,
+        "want_positions": False,
+        "want_bounds": True,
+    }
+
+
+def test_values_are_python_s_own() -> None:
+    request = Request(
+        np.float32(80),
+        isowave.Camera(np.array((0, 0, 5)), [0, 0, 0]),  # type: ignore[arg-type]
+        np.array((64, 48)),
+        color="#ff8000",
+        ambient=np.uint8(3),
+    )
+    assert request == Request(
+        80.0, isowave.Camera((0, 0, 5), (0, 0, 0)), (64, 48), color=(1, 128 / 255, 0), ambient=3
+    )
+    assert type(request.isovalue) is float and type(request.ambient) is int
+    assert request.camera is not None and type(request.camera.eye) is tuple
+
+
+@pytest.mark.parametrize(
+    ("argument", "value", "says"),
+    [
+        ("isovalue", "80", "isovalue='80': give a number"),
+        ("camera", (0, 0, 5), "camera=(0, 0, 5): give an isowave.Camera"),
+        ("camera", isowave.Camera((0, 0), (0, 0, 0)), "Camera.eye=(0, 0): give 3 numbers"),
+        ("size", 64, "size=64: give width and height"),
+        ("samples", 1.5, "samples=1.5: give a whole number"),
+        ("color", "red", "color 'red': give '#rrggbb', or red, green, blue from 0 to 1"),
+        ("background", (1, 2, 3), "color (1.0, 2.0, 3.0): give red, green and blue, from 0 to 1"),
+        ("normals", "flat", "normals 'flat': give 'smooth' or 'cell'"),
+        ("outputs", ("rgb", "a"), "outputs a: there are rgb, depth, normals, position, bounds"),
+        ("max_error", "1", "max_error='1': give a number"),
+        ("voxel_pixels", None, "voxel_pixels=None: give a number"),
+        ("voxel_error", True, "voxel_error=True: give a number"),
+        ("time_budget", "1 s", "time_budget='1 s': give a number"),
+        ("ambient", -1, "ambient=-1: give a whole number from 0 to 4294967295"),
+        ("on_pass", 1, "on_pass=1: give a function"),
+    ],
+)
+def test_an_argument_of_another_kind_is_named(argument: str, value: Any, says: str) -> None:
+    arguments: dict[str, Any] = {"isovalue": 80, argument: value}
+    with pytest.raises((TypeError, ValueError)) as raised:
+        Request(**arguments)
+    assert str(raised.value) == says
+
+
+@pytest.mark.parametrize(
+    ("more", "needs"),
+    [
+        ({}, {}),
+        ({"max_error": 1.0}, {"bounds": "max_error"}),
+        ({"outputs": ("bounds",)}, {"bounds": "max_error"}),
+        ({"voxel_pixels": 1.0}, {"levels": "voxel_pixels"}),
+        ({"time_budget": 1.0}, {"time_budget": "time_budget"}),
+        ({"ambient": 1}, {"rays": "ambient"}),
+    ],
+)
+def test_it_says_what_its_renderer_must_be_made_with(
+    more: dict[str, Any], needs: dict[str, str]
+) -> None:
+    assert Request(80, **more).needs == needs
