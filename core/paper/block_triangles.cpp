@@ -1,6 +1,6 @@
 #include "core/paper/block_triangles.hpp"
 
-#include "core/stages/cell_triangles.hpp"
+#include "core/mesh/cell_triangles.hpp"
 
 namespace isowave::core {
 

@@ -2,7 +2,7 @@
 
 #include <stdexcept>
 
-#include "core/stages/cell_triangles.hpp"
+#include "core/mesh/cell_triangles.hpp"
 
 namespace isowave::core {
 
