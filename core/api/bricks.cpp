@@ -80,8 +80,8 @@ std::string text_of(const BrickOptions &options, const core::Storage &storage) {
 }
 
 /// Opens device and volume, at all processes.
-void open(TeamHeld &held, const std::string &path, const Compression &compression, const RawFile &raw,
-          const BrickOptions &options) {
+void open(TeamHeld &held, const std::string &path, const Compression &compression,
+          const RawFile &raw, const BrickOptions &options) {
   core::Team &team = held.team;
   core::agree_on(team, "version", std::string(version()));
   core::TeamVolumeSource source;
