@@ -5,14 +5,14 @@
 ///
 /// Counting looks at signs alone, 64 of them in a word. Vertices are numbered through all listed
 /// blocks, in the order of the list, so that triangles name those of neighbours.
-#include "device/cells_with_data.h"
 #include "device/dual_grid_inside.h"
 #include "device/work_group.h"
+#include "portable/cells_with_data.h"
 #include "portable/marching_cubes.h"
 
 /// Entries [begin, end) of the list.
 ///
-/// cell_triangles  [256 * ISO_CASE_BYTES] core/stages/cell_triangles.hpp
+/// cell_triangles  [256 * ISO_CASE_BYTES] core/mesh/cell_triangles.hpp
 /// index, no_data_begin  the table of no_data.h: NoDataTable
 /// Out             edges, num_vertices, num_triangles [list]
 /// Launch          grid-stride over entries

@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "core/stages/cell_triangles.hpp"
+#include "core/mesh/cell_triangles.hpp"
 #include "core/view/frame.hpp"
 
 namespace isowave::core {

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "core/extract/mesh.hpp"
+#include "core/mesh/mesh.hpp"
 #include "core/zfp/zfp_stream.hpp"
 #include "kernels_cl/portable/marching_cubes.h"
 

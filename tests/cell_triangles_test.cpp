@@ -1,7 +1,7 @@
-// core/stages/cell_triangles: every table entry is closed over its faces, agrees with its
+// core/mesh/cell_triangles: every table entry is closed over its faces, agrees with its
 // neighbours', and separates what the rule says.
 
-#include "core/stages/cell_triangles.hpp"
+#include "core/mesh/cell_triangles.hpp"
 
 #include <gtest/gtest.h>
 

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/extract/mesh.hpp"
+#include "core/mesh/mesh.hpp"
 
 namespace isowave::core {
 

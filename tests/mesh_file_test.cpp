@@ -1,6 +1,6 @@
-// core/extract/mesh_file: the files that are written, taken apart by the rules of their formats.
+// core/mesh/mesh_file: the files that are written, taken apart by the rules of their formats.
 
-#include "core/extract/mesh_file.hpp"
+#include "core/mesh/mesh_file.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

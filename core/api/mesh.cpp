@@ -1,13 +1,10 @@
 #include "isowave/mesh.hpp"
 
-#include <mutex>
-
 #include "core/api/convert.hpp"
-#include "core/api/device_implementation.hpp"
 #include "core/api/guarded.hpp"
+#include "core/api/mesh_parts.hpp"
 #include "core/api/volume_implementation.hpp"
-#include "core/extract/extractor.hpp"
-#include "core/extract/mesh_file.hpp"
+#include "core/mesh/host_extractor.hpp"
 #include "core/view/detail.hpp"
 #include "core/zfp/isovalue.hpp"
 
@@ -21,28 +18,30 @@ using core::guarded;
 static_assert(static_cast<int>(VertexPlaces::kExact) ==
               static_cast<int>(core::VertexPlaces::kExact));
 
-std::array<float, 3> from_vec3(const glm::vec3 &v) {
-  return {v.x, v.y, v.z};
+void extract_to(const std::shared_ptr<const Volume> &volume, double isovalue,
+                const ExtractOptions &options, core::MeshSink &sink) {
+  if (!volume) throw core::Error("extracting needs a volume");
+  if (options.cache_blocks != 0)
+    throw core::Error("a number of cached blocks is for devices alone: leave out cache_blocks");
+  core::extract_on_host(level_to_extract(*volume, options),
+                        core::drawn_isovalue(volume->implementation().volume, isovalue),
+                        {.with_normals = options.with_normals,
+                         .vertices = static_cast<core::VertexPlaces>(options.vertices),
+                         .memory_limit = options.memory_budget},
+                        sink, progress_of(options, "extracting"));
 }
 
-/// Fills a mesh of users.
-class MeshOfUser : public core::MeshSink {
- public:
-  explicit MeshOfUser(Mesh &mesh) : mesh_(mesh) {}
-  void begin(const core::MeshSize &size) override {
-    mesh_.vertices.reserve(size.num_vertices);
-    if (size.has_normals) mesh_.normals.reserve(size.num_vertices);
-    mesh_.triangles.reserve(size.num_triangles);
-  }
-  void add(const core::MeshPart &part) override {
-    for (const glm::dvec3 &vertex : part.vertices) mesh_.vertices.push_back(from_glm(vertex));
-    for (const glm::vec3 &normal : part.normals) mesh_.normals.push_back(from_vec3(normal));
-    mesh_.triangles.insert(mesh_.triangles.end(), part.triangles.begin(), part.triangles.end());
-  }
+}  // namespace
 
- private:
-  Mesh &mesh_;
-};
+const core::CompressedVolume &level_to_extract(const Volume &volume,
+                                               const ExtractOptions &options) {
+  const std::vector<const core::CompressedVolume *> levels =
+      core::levels_of(volume.implementation().volume, true);
+  if (options.level >= levels.size())
+    throw core::Error("level {} of a volume that has {}: count from 0", options.level,
+                      levels.size());
+  return *levels[options.level];
+}
 
 core::Progress progress_of(const ExtractOptions &options, std::string_view what) {
   if (!options.progress) return {};
@@ -51,48 +50,31 @@ core::Progress progress_of(const ExtractOptions &options, std::string_view what)
   };
 }
 
-void extract_to(const std::shared_ptr<Device> &device, const std::shared_ptr<const Volume> &volume,
-                double isovalue, const ExtractOptions &options, core::MeshSink &sink) {
-  if (!device || !volume) throw core::Error("extracting needs a device and a volume");
-  const std::vector<const core::CompressedVolume *> levels =
-      core::levels_of(volume->implementation().volume, true);
-  if (options.level >= levels.size())
-    throw core::Error("level {} of a volume that has {}: count from 0", options.level,
-                      levels.size());
-  const std::lock_guard lock(device->implementation().mutex);
-  const std::function<void()> before_kernel = [&options] {
-    if (options.progress) options.progress("extracting", 0);
-  };
-  const KernelWatch watch(device->implementation().device, before_kernel);
-  core::Extractor extractor(device->implementation().device, *levels[options.level],
-                            {.with_normals = options.with_normals,
-                             .vertices = static_cast<core::VertexPlaces>(options.vertices),
-                             .memory_budget = options.memory_budget,
-                             .cache_slots = options.cache_blocks});
-  extractor.extract(core::drawn_isovalue(*levels[0], isovalue), sink,
-                    progress_of(options, "extracting"));
+void MeshOfUser::begin(const core::MeshSize &size) {
+  mesh.vertices.reserve(size.num_vertices);
+  if (size.has_normals) mesh.normals.reserve(size.num_vertices);
+  mesh.triangles.reserve(size.num_triangles);
 }
 
-}  // namespace
+void MeshOfUser::add(const core::MeshPart &part) {
+  for (const glm::dvec3 &vertex : part.vertices) mesh.vertices.push_back(from_glm(vertex));
+  for (const glm::vec3 &normal : part.normals)
+    mesh.normals.push_back({normal.x, normal.y, normal.z});
+  mesh.triangles.insert(mesh.triangles.end(), part.triangles.begin(), part.triangles.end());
+}
 
-Mesh extract(const std::shared_ptr<Device> &device, const std::shared_ptr<const Volume> &volume,
-             double isovalue, const ExtractOptions &options) {
+Mesh extract(const std::shared_ptr<const Volume> &volume, double isovalue,
+             const ExtractOptions &options) {
   return guarded("extracting a surface", [&] {
-    Mesh mesh;
-    MeshOfUser sink(mesh);
-    extract_to(device, volume, isovalue, options, sink);
-    return mesh;
+    return extracted([&](core::MeshSink &sink) { extract_to(volume, isovalue, options, sink); });
   });
 }
 
-std::string extract_to_file(const std::shared_ptr<Device> &device,
-                            const std::shared_ptr<const Volume> &volume, double isovalue,
+std::string extract_to_file(const std::shared_ptr<const Volume> &volume, double isovalue,
                             const std::filesystem::path &path, const ExtractOptions &options) {
   return guarded("extracting a surface", [&] {
-    core::MeshFile file(path);
-    extract_to(device, volume, isovalue, options, file);
-    file.commit(progress_of(options, "writing"));
-    return file.notice();
+    return extracted_to_file(
+        path, options, [&](core::MeshSink &sink) { extract_to(volume, isovalue, options, sink); });
   });
 }
 

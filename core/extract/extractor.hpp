@@ -10,8 +10,8 @@
 
 #include <cstdint>
 
-#include "core/extract/mesh.hpp"
 #include "core/extract/surface_blocks.hpp"
+#include "core/mesh/mesh.hpp"
 #include "core/stages/marching_cubes.hpp"
 
 namespace isowave::core {

@@ -19,16 +19,16 @@ namespace {
 // Written by libpng's simplified interface, which reads other pixels than are in files with gamma,
 // and wants memory for all that a header asks for. So reading takes the other one, which reports
 // errors by longjmp. The functions that call setjmp hold no object with a destructor, return false,
-// and leave the message in Message; their callers own everything and throw.
+// and leave the message in PngMessage; their callers own everything and throw.
 
 constexpr std::size_t kSignatureBytes = 8;
 
-struct Message {
+struct PngMessage {
   char text[120] = "unknown error";
 };
 
 void on_error(png_structp png, png_const_charp text) {
-  auto *message = static_cast<Message *>(png_get_error_ptr(png));
+  auto *message = static_cast<PngMessage *>(png_get_error_ptr(png));
   std::snprintf(message->text, sizeof message->text, "%s", text);
   png_longjmp(png, 1);
 }
@@ -36,7 +36,7 @@ void on_error(png_structp png, png_const_charp text) {
 void on_warning(png_structp, png_const_charp) {}
 
 struct Reader {
-  Message message;
+  PngMessage message;
   png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &message, on_error, on_warning);
   png_infop info = png != nullptr ? png_create_info_struct(png) : nullptr;
   Reader() {

@@ -8,8 +8,8 @@
 #include <span>
 #include <vector>
 
-#include "core/ocl/kernel.hpp"
 #include "core/sources/field_rows.hpp"
+#include "kernels/noise_field.hpp"
 #include "kernels_cl/portable/noise.h"
 
 namespace isowave::core {
@@ -49,8 +49,7 @@ class NoiseOnDevice {
   VoxelType type_;
   ocl::Buffer<NoiseOctave> octaves_;
   std::optional<ocl::Buffer<std::byte>> voxels_{};  ///< as many as were asked for at once
-  ocl::Kernel<ocl::In<NoiseOctave>, NoiseShape, uint, uint, uint, uint, ocl::Out<std::byte>>
-      kernel_;
+  ocl::Kernel<kernels::noise_field> kernel_;
 };
 
 }  // namespace isowave::core

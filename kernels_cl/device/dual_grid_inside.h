@@ -23,7 +23,7 @@ ISO_INLINE void dual_grid_inside(const FrameParams *frame, global const BlockEnt
 ///
 /// cells           cells_with_data()
 /// bits            dual_grid_inside(); v: corners_inside() of these
-/// cell_triangles  [256 * ISO_CASE_BYTES] core/stages/cell_triangles.hpp
+/// cell_triangles  [256 * ISO_CASE_BYTES] core/mesh/cell_triangles.hpp
 ISO_INLINE uint count_triangles(ulong cells, const ulong *bits, const ulong *v,
                                 global const uchar *cell_triangles) {
   const ulong changing = changing_cells(bits) & cells;

@@ -5,15 +5,15 @@
 ///
 /// What is drawn, and not kept for anything else, needs no more: no neighbour's vertices, and no
 /// gradients. marching_cubes.cl makes meshes whose triangles share their vertices.
-#include "device/cells_with_data.h"
 #include "device/dual_grid_inside.h"
 #include "device/work_group.h"
 #include "portable/block_vertex.h"
+#include "portable/cells_with_data.h"
 #include "portable/marching_cubes.h"
 
 /// Entries [begin, end) of the list.
 ///
-/// cell_triangles  [256 * ISO_CASE_BYTES] core/stages/cell_triangles.hpp
+/// cell_triangles  [256 * ISO_CASE_BYTES] core/mesh/cell_triangles.hpp
 /// index, no_data_begin  the table of no_data.h: NoDataTable
 /// Out             num_triangles: of entry i at i - first
 /// Launch          grid-stride over entries

@@ -8,7 +8,7 @@
 ///
 /// Edges of a cell: 4 a + k goes along axis a from the corner whose places along the two other
 /// axes, the lower first, are the bits of k. Which triangles a cell has, is in a table by the signs
-/// of its corners (core/stages/cell_triangles.hpp).
+/// of its corners (core/mesh/cell_triangles.hpp).
 #ifndef ISOWAVE_MARCHING_CUBES_H
 #define ISOWAVE_MARCHING_CUBES_H
 

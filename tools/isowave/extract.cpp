@@ -9,9 +9,9 @@
 
 #include "core/base/error.hpp"
 #include "core/extract/extractor.hpp"
-#include "core/extract/mesh_file.hpp"
 #include "core/io/atomic_file.hpp"
 #include "core/io/file_name.hpp"
+#include "core/mesh/mesh_file.hpp"
 #include "core/view/detail.hpp"
 #include "core/zfp/describe_compression.hpp"
 #include "core/zfp/isovalue.hpp"

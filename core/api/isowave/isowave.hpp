@@ -11,13 +11,8 @@
 // several threads; see each.
 
 #include "isowave/bricks.hpp"
-#include "isowave/camera.hpp"
 #include "isowave/device.hpp"
-#include "isowave/error.hpp"
-#include "isowave/frame.hpp"
-#include "isowave/host_renderer.hpp"
-#include "isowave/mesh.hpp"
+#include "isowave/extract.hpp"
+#include "isowave/host.hpp"
 #include "isowave/quick_renderer.hpp"
 #include "isowave/renderer.hpp"
-#include "isowave/version.hpp"
-#include "isowave/volume.hpp"

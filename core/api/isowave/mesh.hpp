@@ -10,7 +10,6 @@
 #include <string_view>
 #include <vector>
 
-#include "isowave/device.hpp"
 #include "isowave/volume.hpp"
 
 namespace isowave {
@@ -27,9 +26,11 @@ struct ExtractOptions {
   std::uint32_t level = 0;   ///< of detail; 0: the volume itself
   bool with_normals = true;  ///< needs more blocks around the surface
   VertexPlaces vertices = VertexPlaces::kApart;
-  std::uint64_t memory_budget = 0;  ///< of device memory [bytes]; 0: three quarters of it
-  /// Decoded blocks of 4^3 voxels that are kept at most, 17 and more (without normals 8); 0: as
-  /// many as the surface needs and the budget allows. The mesh does not depend on it.
+  /// Bound on the device's memory, on the host on value ranges and decoded blocks [bytes]; 0: three
+  /// quarters of the device's memory, a quarter of the host's.
+  std::uint64_t memory_budget = 0;
+  /// Decoded blocks of 4^3 voxels that a device keeps at most, 17 and more (without normals 8); 0:
+  /// as many as the surface needs and the budget allows. The mesh does not depend on it.
   std::uint32_t cache_blocks = 0;
   /// Called from the calling thread: what is done, and how much of it, 0 to 1; before each kernel
   /// is compiled, too. What it throws ends the extraction.
@@ -47,14 +48,14 @@ struct Mesh {
   std::vector<std::array<std::uint32_t, 3>> triangles{};
 };
 
-/// Extracts the isosurface by marching cubes on the device, and waits for it. The bits of the mesh
-/// are the same on every device that divides exactly.
+/// Extracts the isosurface by marching cubes on the host, and waits for it: the mesh that a device
+/// extracts (isowave/extract.hpp), bit for bit.
 ///
-/// Throws  Error: NaN, a level that there is not, a budget that does not suffice (names what
-/// would),
-///         2^32 vertices and more
-Mesh extract(const std::shared_ptr<Device> &device, const std::shared_ptr<const Volume> &volume,
-             double isovalue, const ExtractOptions &options = {});
+/// options  without cache_blocks
+/// Throws   Error: NaN, a level that there is not, a budget that does not suffice (names what
+///          would), 2^32 vertices and more
+Mesh extract(const std::shared_ptr<const Volume> &volume, double isovalue,
+             const ExtractOptions &options = {});
 
 /// The same to a file, for surfaces larger than memory: parts go to disk as they come, in the
 /// file's folder, which holds the mesh twice for a while. The file appears whole or not at all.
@@ -64,8 +65,7 @@ Mesh extract(const std::shared_ptr<Device> &device, const std::shared_ptr<const 
 /// Returns  a line for users, or nothing. STL has float32 alone: far from the origin, the line says
 ///          what is to be added to its positions, as the file's header does
 /// Throws   Error: as above; the file cannot be written, or the format does not hold so much
-std::string extract_to_file(const std::shared_ptr<Device> &device,
-                            const std::shared_ptr<const Volume> &volume, double isovalue,
+std::string extract_to_file(const std::shared_ptr<const Volume> &volume, double isovalue,
                             const std::filesystem::path &path, const ExtractOptions &options = {});
 
 /// Writes a mesh to such a file.

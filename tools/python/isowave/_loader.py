@@ -102,7 +102,7 @@ def trusted_users() -> set[int]:
 def is_private(folder: pathlib.Path) -> bool:
     """Whether no other user can change what is in the folder, nor what leads there.
 
-    core/base/private_folder.cpp has the same rules; it cannot be called before there is OpenCL.
+    core/platform/private_folder.cpp has the same rules; it cannot be called before there is OpenCL.
     """
     trusted, most_links = trusted_users(), 40
     rest = list(folder.absolute().parts[1:])

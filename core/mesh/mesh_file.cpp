@@ -1,4 +1,4 @@
-#include "core/extract/mesh_file.hpp"
+#include "core/mesh/mesh_file.hpp"
 
 #include <fmt/format.h>
 

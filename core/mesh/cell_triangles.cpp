@@ -1,4 +1,4 @@
-#include "core/stages/cell_triangles.hpp"
+#include "core/mesh/cell_triangles.hpp"
 
 #include <cstddef>
 #include <limits>

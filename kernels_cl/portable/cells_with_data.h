@@ -1,15 +1,17 @@
 /// cells_with_data.h -- the cells and edges of a block that may have a surface, beside voxels
-/// without data. OpenCL C 1.2.
+/// without data. Portable: OpenCL C 1.2 and C++.
 #ifndef ISOWAVE_CELLS_WITH_DATA_H
 #define ISOWAVE_CELLS_WITH_DATA_H
 
-#include "portable/block_grid.h"
-#include "portable/marching_cubes.h"
-#include "portable/no_data.h"
+#include "block_grid.h"
+#include "marching_cubes.h"
+#include "no_data.h"
+
+ISO_NAMESPACE_BEGIN
 
 /// The table of no_data.h within a buffer.
 typedef struct NoDataTable {
-  global const uint *words;
+  ISO_GLOBAL const uint *words;
   uint begin;  ///< ISO_INVALID_ID: all voxels have data
 } NoDataTable;
 
@@ -59,5 +61,7 @@ ISO_INLINE BlockEdges edges_with_data(const FrameParams *frame, const BlockGrid 
   }
   return kept;
 }
+
+ISO_NAMESPACE_END
 
 #endif

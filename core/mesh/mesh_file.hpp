@@ -7,8 +7,8 @@
 #include <span>
 #include <string>
 
-#include "core/extract/mesh.hpp"
 #include "core/io/atomic_file.hpp"
+#include "core/mesh/mesh.hpp"
 #include "core/volume/voxel_chunks.hpp"
 
 namespace isowave::core {

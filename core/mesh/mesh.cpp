@@ -1,4 +1,4 @@
-#include "core/extract/mesh.hpp"
+#include "core/mesh/mesh.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,0 +1,56 @@
+#include "isowave/extract.hpp"
+
+#include <mutex>
+
+#include "core/api/device_implementation.hpp"
+#include "core/api/guarded.hpp"
+#include "core/api/mesh_parts.hpp"
+#include "core/api/volume_implementation.hpp"
+#include "core/extract/extractor.hpp"
+#include "core/zfp/isovalue.hpp"
+
+namespace isowave {
+
+namespace {
+
+using core::guarded;
+
+void extract_to(const std::shared_ptr<Device> &device, const std::shared_ptr<const Volume> &volume,
+                double isovalue, const ExtractOptions &options, core::MeshSink &sink) {
+  if (!device || !volume) throw core::Error("extracting needs a device and a volume");
+  const core::CompressedVolume &level = level_to_extract(*volume, options);
+  const std::lock_guard lock(device->implementation().mutex);
+  const std::function<void()> before_kernel = [&options] {
+    if (options.progress) options.progress("extracting", 0);
+  };
+  const KernelWatch watch(device->implementation().device, before_kernel);
+  core::Extractor extractor(device->implementation().device, level,
+                            {.with_normals = options.with_normals,
+                             .vertices = static_cast<core::VertexPlaces>(options.vertices),
+                             .memory_budget = options.memory_budget,
+                             .cache_slots = options.cache_blocks});
+  extractor.extract(core::drawn_isovalue(volume->implementation().volume, isovalue), sink,
+                    progress_of(options, "extracting"));
+}
+
+}  // namespace
+
+Mesh extract(const std::shared_ptr<Device> &device, const std::shared_ptr<const Volume> &volume,
+             double isovalue, const ExtractOptions &options) {
+  return guarded("extracting a surface", [&] {
+    return extracted(
+        [&](core::MeshSink &sink) { extract_to(device, volume, isovalue, options, sink); });
+  });
+}
+
+std::string extract_to_file(const std::shared_ptr<Device> &device,
+                            const std::shared_ptr<const Volume> &volume, double isovalue,
+                            const std::filesystem::path &path, const ExtractOptions &options) {
+  return guarded("extracting a surface", [&] {
+    return extracted_to_file(path, options, [&](core::MeshSink &sink) {
+      extract_to(device, volume, isovalue, options, sink);
+    });
+  });
+}
+
+}  // namespace isowave

@@ -1,0 +1,15 @@
+#pragma once
+// The part of isowave that needs no OpenCL.
+//
+//   auto volume = isowave::open_volume("head.nrrd");
+//   isowave::HostRenderer renderer(volume);
+//   isowave::Frame frame = renderer.render({.camera = renderer.camera(80), .isovalue = 80});
+//   isowave::Mesh mesh = isowave::extract(volume, 80);
+
+#include "isowave/camera.hpp"
+#include "isowave/error.hpp"
+#include "isowave/frame.hpp"
+#include "isowave/host_renderer.hpp"
+#include "isowave/mesh.hpp"
+#include "isowave/version.hpp"
+#include "isowave/volume.hpp"

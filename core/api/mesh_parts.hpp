@@ -1,0 +1,49 @@
+#pragma once
+// Private to core/api: meshes of its users and of core, whoever extracts them.
+
+#include <string>
+#include <string_view>
+
+#include "core/mesh/mesh.hpp"
+#include "core/mesh/mesh_file.hpp"
+#include "core/zfp/zfp_stream.hpp"
+#include "isowave/mesh.hpp"
+
+namespace isowave {
+
+/// The level of detail that is asked for.
+///
+/// Throws  core::Error: there is none
+const core::CompressedVolume &level_to_extract(const Volume &volume, const ExtractOptions &options);
+
+/// Calls options.progress of the step `what`. Empty if there is none.
+core::Progress progress_of(const ExtractOptions &options, std::string_view what);
+
+/// Fills a mesh of users.
+class MeshOfUser : public core::MeshSink {
+ public:
+  void begin(const core::MeshSize &size) override;
+  void add(const core::MeshPart &part) override;
+
+  Mesh mesh{};
+};
+
+/// Makes a mesh. extract_to: gives its parts to a sink.
+template <class ExtractTo>
+Mesh extracted(const ExtractTo &extract_to) {
+  MeshOfUser sink;
+  extract_to(sink);
+  return std::move(sink.mesh);
+}
+
+/// Makes a file. Returns its notice.
+template <class ExtractTo>
+std::string extracted_to_file(const std::filesystem::path &path, const ExtractOptions &options,
+                              const ExtractTo &extract_to) {
+  core::MeshFile file(path);
+  extract_to(file);
+  file.commit(progress_of(options, "writing"));
+  return file.notice();
+}
+
+}  // namespace isowave
