@@ -22,10 +22,10 @@ struct TrianglesInput : SurfaceRig {
     check(last.steps != 0 || last.block_id != 0, "the last triangle is written");
   }
   void count_into(ocl::Buffer<uint> &counts) {
-    triangles.count(frame, *cache, surface->block_ids, {0, num_listed, 0}, counts);
+    triangles.count(frame, cache, surface->block_ids, {0, num_listed, 0}, counts);
   }
   void write_all() {
-    triangles.write(frame, *cache, surface->block_ids, {0, num_listed, 0}, offsets, 0, vertices);
+    triangles.write(frame, cache, surface->block_ids, {0, num_listed, 0}, offsets, 0, vertices);
   }
 
   BlockTriangles triangles;

@@ -17,26 +17,21 @@ std::uint32_t slots_of(const CompressedVolume &volume, const FrameSetup &setup) 
 
 FrameRig::FrameRig(ocl::Device &device, const CompressedVolume &volume, const FrameSetup &setup)
     : params(make_frame_params(volume.info, setup.camera, setup.size, setup.isovalue)),
-      stream(device, volume),
       rays(device, {.num_rays = setup.size.num_pixels(), .scanned_pairs = setup.scanned_pairs}),
-      macrocells(device, params, stream),
-      cache(device, BlockCache::limits_for(params.grid, slots_of(volume, setup), rays.num_rays),
-            kGroupSize),
+      blocks(device, volume, DeviceStream(device, volume),
+             BlockCache::limits_for(params.grid, slots_of(volume, setup), rays.num_rays),
+             kGroupSize),
       compaction(device, rays.num_rays, kGroupSize),
       initial_rays(device, rays.num_rays),
       speculation(device),
       traverse(device, rays.num_rays, kGroupSize, setup.scanned_pairs),
-      zfp_decode(device, cache.num_slots),
       group(device, {rays.num_rays, cache.num_slots, kGroupSize}),
       intersect(device, rays.num_rays, kGroupSize),
       composite(device, rays.num_rays) {
-  params.schedule.max_spec_count = setup.max_speculation;
-  params.schedule.scanned_pairs = setup.scanned_pairs;
-  params.schedule.table_groups = cache.table_groups;
-  macrocells.select(params);
-  params.surface = macrocells.surface(params);
-  params.screen = make_screen_box(params);
-  rays.frame = params;
+  blocks.open(rays, {params}, {{stream.layout, 0}}, FieldBound::kNone, RaySource::kCamera);
+  rays.frame.schedule.max_spec_count = setup.max_speculation;
+  rays.frame.schedule.scanned_pairs = setup.scanned_pairs;
+  params = rays.frame;
 }
 
 void FrameRig::start() {
@@ -59,9 +54,7 @@ void FrameRig::thin_wavefront(std::uint32_t spec_count) {
 void FrameRig::find_blocks() {
   traverse(macrocells, rays);
   cache.request(rays);
-  cache.evict(rays.counts, rays);
-  cache.assign(rays.counts, rays);
-  zfp_decode({stream, rays.frame}, {stream, rays.frame}, rays.counts, cache);
+  blocks.provide(rays.counts, {}, rays);
   group(cache, rays);
 }
 

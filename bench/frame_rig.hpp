@@ -8,10 +8,7 @@
 #include "core/paper/intersect.hpp"
 #include "core/paper/speculation.hpp"
 #include "core/paper/traverse.hpp"
-#include "core/stages/block_cache.hpp"
-#include "core/stages/macrocells.hpp"
-#include "core/stages/wavefront.hpp"
-#include "core/stages/zfp_decode.hpp"
+#include "core/render/block_store.hpp"
 #include "core/view/frame.hpp"
 
 namespace isowave::core::bench {
@@ -48,15 +45,15 @@ class FrameRig {
   PassCounts read_counts() const { return rays.counts.read()[0]; }
 
   FrameParams params;
-  DeviceStream stream;
   Wavefront rays;
-  Macrocells macrocells;
-  BlockCache cache;
+  BlockStore blocks;
+  DeviceStream &stream = blocks.levels[0].stream;
+  Macrocells &macrocells = blocks.levels[0].macrocells;
+  BlockCache &cache = blocks.cache;
   Compaction compaction;
   InitialRays initial_rays;
   Speculation speculation;
   Traverse traverse;
-  ZfpDecode zfp_decode;
   Group group;
   Intersect intersect;
   Composite composite;

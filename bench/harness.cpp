@@ -6,7 +6,7 @@
 
 #include "bench/run_info.hpp"
 #include "core/base/error.hpp"
-#include "core/ocl/kernel.hpp"
+#include "kernels/launch_probe.hpp"
 
 namespace isowave::core::bench {
 
@@ -48,9 +48,8 @@ Ceiling measure_ceiling(ocl::Device &device) {
   const auto count = static_cast<uint>(bytes / sizeof(uint));
   const ocl::Buffer<uint> source(device, "copy source", count);
   ocl::Buffer<uint> target(device, "copy target", count);
-  ocl::Kernel<ocl::In<uint>, uint, uint, ocl::Out<uint>> scale(device, "launch_probe",
-                                                               "scale_values");
-  ocl::Kernel<> empty(device, "launch_probe", "launch_empty");
+  ocl::Kernel<kernels::scale_values> scale(device);
+  ocl::Kernel<kernels::launch_empty> empty(device);
   const ocl::Range range = ocl::Range::strided(count, 256, device);
   const double copy = best_seconds(device, [&] {
     device.queue().enqueueCopyBuffer(source.mem(), target.mem(), 0, 0, bytes, nullptr,

@@ -32,7 +32,7 @@ struct MacrocellsInput {
   /// ranges say.
   void verify() {
     const std::vector<float> voxels = decode_with_libzfp(volume);
-    const std::vector<cl_ushort> ranges = macrocells.ranges().read();
+    const std::vector<ushort> ranges = macrocells.ranges().read();
     const std::vector<uint> masks = macrocells.masks().read();
     const std::vector<float> &thresholds = macrocells.thresholds();
     const std::size_t n = volume.info.dims.x, blocks = n / 4, coarse = (blocks + 3) / 4;
@@ -68,7 +68,7 @@ struct MacrocellsInput {
 void build_ranges(benchmark::State &state) {
   auto &in = input<MacrocellsInput>(state.range(0), state.range(1));
   const auto blocks = static_cast<double>(in.volume.block_count());
-  const double bytes = blocks * (in.stream.layout.bits_per_block / 8.0 + sizeof(cl_ushort));
+  const double bytes = blocks * (in.stream.layout.bits_per_block / 8.0 + sizeof(ushort));
   measure(
       state, {blocks, bytes}, [] {},
       [&] { const Macrocells built(Session::current().device(), in.params, in.stream); });
@@ -78,7 +78,7 @@ void select_isovalue(benchmark::State &state) {
   auto &in = input<MacrocellsInput>(state.range(0), state.range(1));
   const auto blocks = static_cast<double>(in.volume.block_count());
   measure(
-      state, {blocks, blocks * (sizeof(cl_ushort) + 1.0 / 8)}, [] {},
+      state, {blocks, blocks * (sizeof(ushort) + 1.0 / 8)}, [] {},
       [&] {
         in.params.surface.isovalue = std::nextafter(
             in.params.surface.isovalue, kMixingLayerIsovalue + 1.0f);  // or nothing is done

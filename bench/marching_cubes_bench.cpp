@@ -22,7 +22,7 @@ struct WriteInput : SurfaceRig {
       largest = std::max({largest, triangle.a, triangle.b, triangle.c});
     check(largest + 1 == num_vertices, "triangles name all vertices");
   }
-  void run() { cubes.write(frame, *cache, listed, 0, num_listed, *surface, mesh); }
+  void run() { cubes.write(frame, cache, listed, 0, num_listed, *surface, mesh); }
 
   MeshBuffers mesh;
 };

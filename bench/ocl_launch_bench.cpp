@@ -4,7 +4,7 @@
 #include <chrono>
 
 #include "bench/harness.hpp"
-#include "core/ocl/kernel.hpp"
+#include "kernels/launch_probe.hpp"
 #include "kernels_cl/portable/shared_types.h"
 
 namespace isowave::core::bench {
@@ -18,15 +18,13 @@ constexpr int kBatch = 1000;
 /// Profiling belongs to the queue, so each has a device of its own.
 struct LaunchInput {
   LaunchInput(ocl::Device &session_device, bool profiling)
-      : device(session_device.info(), profiling),
-        empty(device, "launch_probe", "launch_empty"),
-        counts(device, "counts", 1) {
+      : device(session_device.info(), profiling), empty(device), counts(device, "counts", 1) {
     empty({1, 64});
     device.finish();
   }
 
   ocl::Device device;
-  ocl::Kernel<> empty;
+  ocl::Kernel<kernels::launch_empty> empty;
   ocl::Buffer<PassCounts> counts;
 };
 

@@ -94,7 +94,8 @@ std::unique_ptr<PeerSide> make_host_side(CompressedVolume volume, const Camera &
 std::unique_ptr<PeerSide> make_renderer_side(CompressedVolume volume, const Camera &camera,
                                              ImageSize size, PipelinePtr pipeline,
                                              const std::string &device) {
-  return std::make_unique<RendererSide>(std::move(volume), camera, size, std::move(pipeline), device);
+  return std::make_unique<RendererSide>(std::move(volume), camera, size, std::move(pipeline),
+                                        device);
 }
 
 }  // namespace isowave::core::bench

@@ -32,9 +32,7 @@ RaysRig::RaysRig(ocl::Device &device, std::int64_t width)
 void RaysRig::draw() {
   while (read_counts().next_active_count != 0) {
     rays.open_pass();
-    cache.evict(rays.previous_counts, rays);
-    cache.assign(rays.previous_counts, rays);
-    zfp_decode({stream, rays.frame}, {stream, rays.frame}, rays.counts, cache);
+    blocks.provide(rays.previous_counts, {}, rays);
     march(macrocells, cache, rays);
     request_ahead(macrocells, cache, rays);
     num_hits += read_counts().hit_count;

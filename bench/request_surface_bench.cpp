@@ -9,7 +9,7 @@ void request_surface(benchmark::State &state, Gradients gradients) {
   auto &in = input<SurfaceRig>(state.range(0), gradients);
   const double asked = double(blocks_of_block(gradients)) * in.num_listed;
   measure(
-      state, {double(in.num_listed), 20 * asked}, [] {}, [&] { in.ask(); });
+      state, {double(in.num_listed), 20 * asked}, [&] { in.begin_pass(); }, [&] { in.ask(); });
   check(in.rays.counts.read()[0].requested_count == 0, "nothing is missing");
   state.counters["needed"] = in.num_needed;
 }

@@ -15,9 +15,7 @@ struct NormalsInput : RaysRig {
     check(read_counts().next_active_count != 0, "blocks for normals alone");
     while (read_counts().next_active_count != 0) {
       rays.open_pass();
-      cache.evict(rays.previous_counts, rays);
-      cache.assign(rays.previous_counts, rays);
-      zfp_decode({stream, rays.frame}, {stream, rays.frame}, rays.counts, cache);
+      blocks.provide(rays.previous_counts, {}, rays);
       run(false);
     }
     begin();

@@ -5,10 +5,9 @@
 
 #include "bench/harness.hpp"
 #include "bench/scenes.hpp"
-#include "core/stages/macrocells.hpp"
+#include "core/render/block_store.hpp"
 #include "core/stages/marching_cubes.hpp"
 #include "core/stages/prefix_sum.hpp"
-#include "core/stages/zfp_decode.hpp"
 
 namespace isowave::core::bench {
 
@@ -18,27 +17,23 @@ struct SurfaceRig {
   SurfaceRig(ocl::Device &device, std::int64_t edge, Gradients with)
       : gradients(with),
         frame(make_grid_params(mixing_layer(edge).info)),
-        stream(device, mixing_layer(edge)),
-        macrocells(device, frame, stream),
+        rays(device, {.num_rays = 1, .with_pairs = false}),
+        blocks(device, mixing_layer(edge), DeviceStream(device, mixing_layer(edge)),
+               limits(kMinCacheSlots), kGroupSize),
         listed(device, num_macrocells(frame.grid)),
         request(device, with),
-        cubes(device, with),
-        rays(device, {.num_rays = 1, .with_pairs = false}) {
-    frame.surface.isovalue = kMixingLayerIsovalue;
-    macrocells.select(frame);
-    num_listed = listed.count(frame, macrocells.masks());
+        cubes(device, with) {
+    open();
+    num_listed = listed.count(frame, blocks.levels[0].macrocells.masks());
     surface = std::make_unique<SurfaceCounts>(device, num_listed);
     listed.list(frame, surface->block_ids);
     num_needed = request.count_needed(frame, surface->block_ids, num_listed);
-    cache = std::make_unique<BlockCache>(
-        device, BlockCache::limits_for(frame.grid, num_needed, num_needed), kGroupSize);
-    frame.schedule.table_groups = cache->table_groups;
-    rays.frame = frame;
+    blocks.resize(limits(num_needed), rays);
+    open();
+    begin_pass();
     ask();
     check(rays.counts.read()[0].requested_count == num_needed, "all needed blocks are asked for");
-    cache->assign(rays.counts, rays);
-    ZfpDecode decode(device, cache->capacity, stream.defines());
-    decode({stream, frame}, {stream, frame}, rays.counts, *cache);
+    blocks.provide(rays.counts, {}, rays);
     count();
     PrefixSum sum(device, num_listed, kGroupSize);
     sum(surface->vertex_offsets, num_listed);
@@ -48,27 +43,32 @@ struct SurfaceRig {
     check(num_vertices > 0 && num_triangles > num_vertices, "there is a surface");
   }
 
-  /// Opens a pass, and asks for all blocks.
-  void ask() {
-    PassCounts counts{};
-    counts.ray_count = 1;
-    counts.pass = counts.frame_pass = counts.last_frame_pass = ++pass;
-    rays.counts.write({&counts, 1});
-    request(surface->block_ids, 0, num_listed, *cache, rays);
-  }
-  void count() { cubes.count(frame, *cache, 0, num_listed, *surface); }
+  void begin_pass() { blocks.begin_host_pass(rays); }
+  /// Asks for all blocks.
+  void ask() { request(surface->block_ids, 0, num_listed, cache, rays); }
+  void count() { cubes.count(frame, cache, 0, num_listed, *surface); }
 
   Gradients gradients;
   FrameParams frame;
-  DeviceStream stream;
-  Macrocells macrocells;
+  Wavefront rays;
+  BlockStore blocks;
+  BlockCache &cache = blocks.cache;
   ActiveBlocks listed;
   RequestSurface request;
   MarchingCubes cubes;
-  Wavefront rays;
-  uint pass = 1, num_listed = 0, num_needed = 0, num_vertices = 0, num_triangles = 0;
+  uint num_listed = 0, num_needed = 0, num_vertices = 0, num_triangles = 0;
   std::unique_ptr<SurfaceCounts> surface;
-  std::unique_ptr<BlockCache> cache;
+
+ private:
+  BlockCache::Limits limits(uint num_slots) const {
+    return BlockCache::limits_for(frame.grid, num_slots, ISO_MAX_CACHE_SLOTS);
+  }
+  void open() {
+    frame.surface.isovalue = kMixingLayerIsovalue;
+    blocks.open(rays, {frame}, {{blocks.levels[0].stream.layout, 0}}, FieldBound::kNone,
+                RaySource::kGiven);
+    frame = rays.frame;
+  }
 };
 
 inline constexpr std::array<std::int64_t, 2> kSurfaceEdges = {128, 256};

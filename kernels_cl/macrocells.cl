@@ -17,12 +17,8 @@
 #include "device/block_stream.h"
 #include "portable/block_grid.h"
 
-typedef struct ValueRange {
-  float min, max; /* min > max: empty */
-} ValueRange;
-
-ISO_INLINE ValueRange join(ValueRange a, ValueRange b) {
-  ValueRange r;
+ISO_INLINE VoxelRange join(VoxelRange a, VoxelRange b) {
+  VoxelRange r;
   r.min = a.min < b.min ? a.min : b.min;
   r.max = a.max > b.max ? a.max : b.max;
   return r;
@@ -39,7 +35,7 @@ kernel void macrocell_partials(const FrameParams frame_params, global const uint
                                global const uint *part_1, global const uint *part_2,
                                global const uint *part_3, global const uint *index,
                                const StreamLayout layout, uint first_block, uint stride,
-                               uint num_blocks, uint first_partial, global ValueRange *partials) {
+                               uint num_blocks, uint first_partial, global VoxelRange *partials) {
   const FrameParams *frame = &frame_params;
   for (uint i = get_global_id(0); i < num_blocks; i += get_global_size(0)) {
     const uint block_id = sampled_block(first_block + i * stride, stride);
@@ -52,7 +48,7 @@ kernel void macrocell_partials(const FrameParams frame_params, global const uint
     for (uint lattice = 0; lattice < 8; ++lattice) {
       const uint end_x = lattice & 1 ? 1 : size_x, end_y = lattice & 2 ? 1 : size_y,
                  end_z = lattice & 4 ? 1 : size_z;
-      ValueRange range;
+      VoxelRange range;
       range.min = INFINITY;
       range.max = -INFINITY;
       for (uint z = 0; z < end_z; ++z) {
@@ -75,9 +71,9 @@ kernel void macrocell_partials(const FrameParams frame_params, global const uint
 /// Out       extremes [2]: bits of the least and of the largest value; those of negative values are
 ///           flipped but for the sign, so that they are ordered as values are
 /// Launch    grid-stride over blocks; few work-items, as each has atomics
-kernel void macrocell_extremes(uint num_blocks, global const ValueRange *partials,
+kernel void macrocell_extremes(uint num_blocks, global const VoxelRange *partials,
                                global int *extremes) {
-  ValueRange range;
+  VoxelRange range;
   range.min = INFINITY;
   range.max = -INFINITY;
   for (uint i = get_global_id(0); i < num_blocks; i += get_global_size(0))
@@ -95,7 +91,7 @@ kernel void macrocell_extremes(uint num_blocks, global const ValueRange *partial
 ///               own no dual cell
 /// Launch        grid-stride over the layer's blocks
 kernel void macrocell_ranges(const FrameParams frame_params, uint layer,
-                             global const ValueRange *below, global const ValueRange *above,
+                             global const VoxelRange *below, global const VoxelRange *above,
                              global const float *thresholds, global ushort *ranges) {
   const FrameParams *frame = &frame_params;
   const uint layer_blocks = frame->grid.blocks_x * frame->grid.blocks_y;
@@ -103,7 +99,7 @@ kernel void macrocell_ranges(const FrameParams frame_params, uint layer,
     const uint x = i % frame->grid.blocks_x, y = i / frame->grid.blocks_x;
     const int owns_cells = 4 * x + 1 < frame->grid.dims_x && 4 * y + 1 < frame->grid.dims_y &&
                            4 * layer + 1 < frame->grid.dims_z;
-    ValueRange range;
+    VoxelRange range;
     uint low = 255, high = 0;
     range.min = INFINITY;
     range.max = -INFINITY;

@@ -163,6 +163,7 @@ kernel void open_packets(const FrameParams frame_params, uint begins, global con
   if (begins != 0) {
     counts->last_frame_pass = prev->frame_pass;
     counts->frame_pass = counts->pass;
+    counts->window_count = first_window(&frame_params);
   } else {
     counts->active_count = prev->next_active_count;
   }

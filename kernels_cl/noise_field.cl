@@ -30,8 +30,11 @@ static void add_octave(NoiseOctave o, uint x, uint y, uint z, double *sums) {
 }
 
 /// Voxels [num_layers][ny][nx] of the layers from z_begin on. Grid-stride over runs of four voxels.
+///
+/// bytes  of the voxels
 kernel void noise_field(global const NoiseOctave *octaves, NoiseShape shape, uint nx, uint ny,
-                        uint z_begin, uint num_layers, global ISO_VOXEL *voxels) {
+                        uint z_begin, uint num_layers, global void *bytes) {
+  global ISO_VOXEL *voxels = (global ISO_VOXEL *)bytes;
   const uint runs = (nx + RUN - 1u) / RUN, count = runs * ny * num_layers;
   for (uint i = get_global_id(0); i < count; i += get_global_size(0)) {
     const uint x = RUN * (i % runs), row = i / runs, y = row % ny, z = z_begin + row / ny;

@@ -30,15 +30,16 @@ ISO_INLINE void clear_hits(global uint *words, uint count) {
   }
 }
 
-/// Begins a frame.
+/// Begins a wave of rays.
 ///
+/// begins_frame  1: and with it a frame, for the stamps of cache slots (slot_stamps.h)
 /// frames  [num_frames] with levels of detail, those that draw, the finest first; frame_params is
 ///         the first of them
 /// given   [pixel] the rays, where ISO_GIVEN_RAYS is 1
 /// ranges  of the blocks of all levels
 /// no_data, no_data_begin  as lacks_data_at_border
-/// counts  of the last pass of the frame before
-/// next    counts of this frame's first pass
+/// counts  of the last pass of the wave before
+/// next    counts of this wave's first pass
 /// In      counts->next_active_count: 0
 /// Out     hit_words: hits [pixel], seen as words, all none; next_active_ray_ids
 ///         [counts->next_active_count]: of the frame's screen box, the pixels whose rays meet an
@@ -47,18 +48,21 @@ ISO_INLINE void clear_hits(global uint *words, uint count) {
 ///         parts, one after the other, as `parts` says (ocl::Range)
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_rays(
     const FrameParams frame_params, global const FrameParams *frames, uint num_frames, uint parts,
-    global const GivenRay *given, global const uint *macrocell_masks, global const ushort *ranges,
-    global const uint *no_data, uint no_data_begin, global PassCounts *counts,
-    global PassCounts *next, global uint *next_active_ray_ids, global uint *ray_block_ids,
-    global uint *hit_words) {
+    uint begins_frame, global const GivenRay *given, global const uint *macrocell_masks,
+    global const ushort *ranges, global const uint *no_data, uint no_data_begin,
+    global PassCounts *counts, global PassCounts *next, global uint *next_active_ray_ids,
+    global uint *ray_block_ids, global ISO_WORDS(HitRecord) *hit_words) {
   const FrameParams *frame = &frame_params;
   local uint found[ISO_GROUP_SIZE], counters[2];
   const PixelBox box = {frame->screen.begin_x, frame->screen.begin_y, frame->screen.end_x,
                         frame->screen.end_y};
   const uint item = get_local_id(0), num_tiled = num_tiled_pixels(box);
   if (get_global_id(0) == 0) {
-    next->last_frame_pass = counts->frame_pass;
-    next->frame_pass = next->pass;
+    if (begins_frame != 0) {
+      next->last_frame_pass = counts->frame_pass;
+      next->frame_pass = next->pass;
+    }
+    next->window_count = first_window(frame);
   }
   for (uint begin = get_global_id(0) - item; begin < frame_rays(frame);
        begin += parts * get_global_size(0)) {

@@ -448,7 +448,7 @@ TEST_P(ApiOnDevice, ThreadsLookAtAFrameInTurns) {
 TEST_P(ApiOnDevice, WhatIsAtWorkIsNotUsedInItsOnPass) {
   const std::shared_ptr<Device> device = open_device(selector());
   Renderer renderer(device, sphere(), {.largest = {64, 48, 1}});
-  HostRenderer host(renderer.volume());
+  Renderer host = make_host_renderer(renderer.volume());
   FrameRequest request = small_request(renderer);
   std::optional<Renderer> other(std::in_place, device, sphere(),
                                 RendererOptions{.largest = {8, 8, 1}});
@@ -519,7 +519,7 @@ TEST_P(ApiOnDevice, ForkedProcessesGetAnError) {
 TEST_P(ApiOnDevice, HitsBeyondFloat32AreAnError) {
   const std::shared_ptr<Device> device = open_device(selector());
   Renderer renderer(device, sphere(), {.largest = {64, 48, 1}, .with_rays = true});
-  HostRenderer host(renderer.volume());
+  Renderer host = make_host_renderer(renderer.volume());
   const auto ray = [](double length) { return Ray{{15, 26, 0}, {0, 0, length}}; };
   const std::vector<Ray> near{ray(1e-36), ray(1e-36)}, far{ray(1), ray(1e-39)};
   const Frame frame = renderer.cast_rays(near, 0.6f);

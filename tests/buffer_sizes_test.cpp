@@ -263,17 +263,11 @@ void check_pass_readback(ocl::Device &device) {
 void check_pipelines(ocl::Device &device) {
   const CompressedVolume volume = small_volume(false);
   const FrameParams grid = make_grid_params(volume.info);
-  DeviceStream stream(device, volume);
-  Macrocells macrocells(device, grid, stream);
-  ZfpDecode decode(device, 30, stream.defines());
-  std::vector<Level> levels;
-  levels.push_back({volume.info, volume.precision, LevelError(volume, true), std::move(stream),
-                    std::move(macrocells), std::move(decode)});
   for (const Grouping grouping : {Grouping::kRadix, Grouping::kCounting}) {
     const WaveLimits limits{100, 20, 8};
     const PipelinePtr pipeline = blocks_pipeline({.grouping = grouping});
-    BlockStore blocks(device, std::move(levels),
-                      BlockCache(device, BlockCache::limits_for(grid.grid, 20, 100), 8));
+    BlockStore blocks(device, volume, DeviceStream(device, volume),
+                      BlockCache::limits_for(grid.grid, 20, 100), 8);
     Wavefront rays(device, {limits.num_rays});
     expect_books(device, pipeline->sizes(limits),
                  [&] { return pipeline->make_wave(blocks, rays, limits, {}); });
@@ -287,7 +281,6 @@ void check_pipelines(ocl::Device &device) {
     const PipelinePtr scanned = blocks_pipeline({.grouping = grouping, .scanned_pairs = true});
     expect_books(device, scanned->sizes(limits),
                  [&] { return scanned->make_wave(blocks, rays, limits, {}); });
-    levels = std::move(blocks.levels);
   }
 }
 

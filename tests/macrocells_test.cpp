@@ -128,7 +128,7 @@ class MacrocellsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
 
   static void expect_ranges(const Macrocells &macrocells, const std::vector<Range> &expected) {
     const std::vector<float> &thresholds = macrocells.thresholds();
-    const std::vector<cl_ushort> ranges = macrocells.ranges().read();
+    const std::vector<ushort> ranges = macrocells.ranges().read();
     ASSERT_EQ(thresholds.size(), 256u);
     ASSERT_TRUE(std::ranges::is_sorted(thresholds));
     ASSERT_EQ(thresholds.front(), -kInfinity);
@@ -166,7 +166,7 @@ class MacrocellsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
                           std::size_t &num_selected, std::size_t &num_in_range) {
     const std::vector<uint> masks = macrocells.masks().read();
     const std::vector<float> &thresholds = macrocells.thresholds();
-    const std::vector<cl_ushort> ranges = macrocells.ranges().read();
+    const std::vector<ushort> ranges = macrocells.ranges().read();
     std::size_t num_bits = 0, num_blocks_selected = 0;
     for (const uint word : masks) num_bits += static_cast<std::size_t>(std::popcount(word));
     for (uint b = 0; b < expected.size(); ++b) {

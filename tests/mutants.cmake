@@ -121,7 +121,7 @@ function(add_device_mutant name pipelines file from to)
     OUTPUT ${folder}/kernels.cpp
     COMMAND ${CMAKE_COMMAND} -D "output=${folder}/kernels.cpp" -D "folder=${folder}/kernels_cl"
             -D "files=${files}" -P ${embed_kernels_script}
-    DEPENDS ${files} ${embed_kernels_script} VERBATIM)
+    DEPENDS ${files} ${embed_kernels_script} ${kernel_signatures} VERBATIM)
   # The linker takes these kernels, and not those of isowave_kernels behind them.
   add_executable(mutant_${mutant} $<TARGET_OBJECTS:device_mutant_main> ${folder}/kernels.cpp)
   target_link_libraries(mutant_${mutant} PRIVATE isowave_reference)

@@ -13,6 +13,12 @@
 #include <vector>
 
 #include "core/base/error.hpp"
+#include "kernels/launch_probe.hpp"
+#include "kernels/macrocells.hpp"
+#include "kernels/prefix_sum.hpp"
+#include "kernels/rasterise.hpp"
+#include "kernels/scan.hpp"
+#include "kernels/shade.hpp"
 #include "kernels_cl/portable/shared_types.h"
 #include "tests/test_devices.hpp"
 
@@ -22,11 +28,28 @@ namespace {
 using ocl::In;
 using ocl::Local;
 using ocl::Out;
+using ocl::Params;
 using ocl::Range;
 using testing::AllOf;
 using testing::HasSubstr;
 
-using ScaleKernel = ocl::Kernel<In<uint>, uint, uint, Out<uint>>;
+// What kernels_cl says is what C++ knows: a parameter of each kind.
+template <class Signature, class... Types>
+constexpr bool kTakes = std::is_same_v<typename Signature::Params, Params<Types...>>;
+static_assert(kTakes<kernels::launch_empty>);
+static_assert(kTakes<kernels::scale_values, In<uint>, uint, uint, Out<uint>>);
+static_assert(kTakes<kernels::reverse_groups, Out<uint>, Local<uint>>);
+static_assert(kTakes<kernels::store_pair_hit, PairHit, Out<PairHit>>);
+static_assert(kTakes<kernels::prefix_tile_offsets, uint, Out<uint>, Out<uint>>);  // attributes
+static_assert(kTakes<kernels::macrocell_coarse_ranges, FrameParams, uint, In<ushort>,
+                     Out<ushort>>);  // const FrameParams
+static_assert(kTakes<kernels::shade, FrameParams, In<ShadeParams>, uint, In<HitRecord>, In<uchar>,
+                     uint, Out<uint>>);  // constant ShadeParams *
+static_assert(kTakes<kernels::compact_count, In<uint>, In<PassCounts>, uint, Out<uint>>);  // words
+static_assert(kTakes<kernels::raster_part, FrameParams, RasterView, uint, uint, In<BlockVertex>,
+                     Out<uint>, Out<uint>, uint, Out<uint>>);  // volatile global uint *
+
+using ScaleKernel = ocl::Kernel<kernels::scale_values>;
 
 // The C++ compiler refuses other arguments.
 static_assert(std::is_invocable_v<ScaleKernel &, Range, ocl::Buffer<uint> &, uint, uint,
@@ -44,7 +67,7 @@ class OclKernelOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
 };
 
 TEST_P(OclKernelOnDevice, ScalesAtAwkwardCounts) {
-  ScaleKernel scale(device_, "launch_probe", "scale_values");
+  ScaleKernel scale(device_);
   for (const uint count : {0u, 1u, 63u, 64u, 65u, 1000u}) {
     std::vector<uint> values(count);
     std::iota(values.begin(), values.end(), 1u);
@@ -60,7 +83,7 @@ TEST_P(OclKernelOnDevice, SmallGroupsOfDevicesThatGiveNoLargerOnes) {
   ocl::DeviceInfo info = GetParam();
   info.capabilities.max_work_group_size = 6;
   ocl::Device device(info);
-  ScaleKernel scale(device, "launch_probe", "scale_values");
+  ScaleKernel scale(device);
   std::vector<uint> values(1000);
   std::iota(values.begin(), values.end(), 1u);
   const ocl::Buffer<uint> input(device, "input", values);
@@ -69,7 +92,7 @@ TEST_P(OclKernelOnDevice, SmallGroupsOfDevicesThatGiveNoLargerOnes) {
   for (uint &value : values) value *= 3;
   EXPECT_EQ(output.read(), values);
   // Built for groups of 4 instead of 64, of which one stands for all.
-  ocl::Kernel<Out<uint>> sizes(device, "launch_probe", "group_sizes", {{"ISO_GROUP_SIZE", "64u"}});
+  ocl::Kernel<kernels::group_sizes> sizes(device, {{"ISO_GROUP_SIZE", "64u"}});
   ocl::Buffer<uint> seen(device, "seen", 3);
   sizes(Range::groups(1, 64), seen);
   EXPECT_THAT(seen.read(), testing::ElementsAre(4u, 16u, 1u));
@@ -80,7 +103,7 @@ TEST_P(OclKernelOnDevice, SmallLocalMemoryAndGroups) {
   std::vector<uint> values(kGroupSize * kNumGroups);
   std::iota(values.begin(), values.end(), 0u);
   ocl::Buffer<uint> buffer(device_, "values", values);
-  ocl::Kernel<Out<uint>, Local<uint>> reverse(device_, "launch_probe", "reverse_groups");
+  ocl::Kernel<kernels::reverse_groups> reverse(device_);
   reverse(Range::covering(values.size(), kGroupSize), buffer, {kGroupSize});
   for (std::size_t group = 0; group < kNumGroups; ++group) {
     const auto begin = values.begin() + static_cast<std::ptrdiff_t>(group * kGroupSize);
@@ -91,8 +114,7 @@ TEST_P(OclKernelOnDevice, SmallLocalMemoryAndGroups) {
 
 TEST_P(OclKernelOnDevice, SmallStructsPassByValue) {
   ocl::Buffer<PairHit> stored(device_, "stored", 1);
-  ocl::Kernel<PairHit, Out<PairHit>>(device_, "launch_probe", "store_pair_hit")({1, 1}, {42, 0.25f},
-                                                                                stored);
+  ocl::Kernel<kernels::store_pair_hit>{device_}({1, 1}, {42, 0.25f}, stored);
   EXPECT_EQ(stored.read().front().cell, 42u);
   EXPECT_EQ(stored.read().front().s, 0.25f);
 }
@@ -100,8 +122,7 @@ TEST_P(OclKernelOnDevice, SmallStructsPassByValue) {
 TEST_P(OclKernelOnDevice, SmallKernelsOfOneProgramKeepTheirOwnArguments) {
   const ocl::Buffer<uint> input(device_, "input", std::vector<uint>{1});
   ocl::Buffer<uint> twice(device_, "twice", 1), thrice(device_, "thrice", 1);
-  ScaleKernel first(device_, "launch_probe", "scale_values"),
-      second(device_, "launch_probe", "scale_values");
+  ScaleKernel first(device_), second(device_);
   first({1, 1}, input, 1, 2, twice);
   second({1, 1}, input, 1, 3, thrice);
   EXPECT_EQ(twice.read().front(), 2u);
@@ -109,25 +130,20 @@ TEST_P(OclKernelOnDevice, SmallKernelsOfOneProgramKeepTheirOwnArguments) {
 }
 
 TEST_P(OclKernelOnDevice, NoGroupsEnqueueNothing) {
-  ocl::Kernel<> empty(device_, "launch_probe", "launch_empty");
+  ocl::Kernel<kernels::launch_empty> empty(device_);
   EXPECT_NO_THROW(empty({0, 64}));
   EXPECT_NO_THROW(empty({1, 1}));
   device_.finish();
 }
 
-TEST_P(OclKernelOnDevice, WrongArityIsAnInvalidArgument) {
-  try {
-    ocl::Buffer<uint> buffer(device_, "input", 1);
-    ocl::Kernel<In<uint>, uint>(device_, "launch_probe", "scale_values")({1, 1}, buffer, 1);
-    FAIL() << "two of four parameters were accepted";
-  } catch (const std::invalid_argument &error) {
-    EXPECT_STREQ(error.what(), "kernel 'scale_values' takes 4 arguments, its C++ type names 2");
-  }
-}
+struct NoSuchKernel {
+  static constexpr const char *kStem = "launch_probe", *kName = "no_such_kernel";
+  using Params = ocl::Params<>;
+};
 
 TEST_P(OclKernelOnDevice, MissingKernelIsAnError) {
   try {
-    ocl::Kernel<>(device_, "launch_probe", "no_such_kernel")({1, 1});
+    ocl::Kernel<NoSuchKernel>{device_}({1, 1});
     FAIL() << "a missing kernel was made";
   } catch (const Error &error) {
     EXPECT_THAT(error.what(),
@@ -136,7 +152,7 @@ TEST_P(OclKernelOnDevice, MissingKernelIsAnError) {
 }
 
 TEST_P(OclKernelOnDevice, MovedFromBufferIsAnInvalidArgument) {
-  ScaleKernel scale(device_, "launch_probe", "scale_values");
+  ScaleKernel scale(device_);
   ocl::Buffer<uint> input(device_, "input", 1), output(device_, "output", 1);
   const ocl::Buffer<uint> moved(std::move(output));
   // NOLINTNEXTLINE(bugprone-use-after-move): what the test is about
@@ -144,8 +160,7 @@ TEST_P(OclKernelOnDevice, MovedFromBufferIsAnInvalidArgument) {
 }
 
 TEST_P(OclKernelOnDevice, LaunchErrorsNameKernelAndCode) {
-  ocl::Kernel<In<uint>, uint, Out<uint>> sums(device_, "prefix_sum", "prefix_tile_sums",
-                                              {{"ISO_GROUP_SIZE", "4u"}});
+  ocl::Kernel<kernels::prefix_tile_sums> sums(device_, {{"ISO_GROUP_SIZE", "4u"}});
   const ocl::Buffer<uint> input(device_, "input", 1);
   ocl::Buffer<uint> output(device_, "output", 1);
   try {

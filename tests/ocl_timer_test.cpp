@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "core/ocl/kernel.hpp"
+#include "kernels/launch_probe.hpp"
 #include "kernels_cl/portable/shared_types.h"
 #include "tests/test_devices.hpp"
 
@@ -25,8 +25,7 @@ class OclTimerOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     constexpr uint kCount = 1u << 14;
     const ocl::Buffer<uint> input(device, "input", kCount);
     ocl::Buffer<uint> output(device, "output", kCount);
-    ocl::Kernel<ocl::In<uint>, uint, uint, ocl::Out<uint>> scale(device, "launch_probe",
-                                                                 "scale_values");
+    ocl::Kernel<kernels::scale_values> scale(device);
     scale(ocl::Range::strided(kCount, 64, device), input, kCount, 3, output);
   }
 };
@@ -35,7 +34,7 @@ TEST_P(OclTimerOnDevice, CountsCommandsOnAndOff) {
   for (const bool profiling : {false, true}) {
     SCOPED_TRACE(profiling);
     ocl::Device device(GetParam(), profiling);
-    ocl::Kernel<> empty(device, "launch_probe", "launch_empty");
+    ocl::Kernel<kernels::launch_empty> empty(device);
     ocl::Buffer<uint> buffer(device, "buffer", 4);
     const std::uint64_t before = device.timer().num_commands();
     empty({1, 1});

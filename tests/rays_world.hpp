@@ -8,10 +8,10 @@
 #include <map>
 #include <vector>
 
+#include "core/render/block_store.hpp"
 #include "core/stages/march.hpp"
 #include "core/stages/request_ahead.hpp"
 #include "core/stages/start_rays.hpp"
-#include "core/stages/zfp_decode.hpp"
 #include "kernels_cl/portable/ray_state.h"
 #include "tests/frame_scene.hpp"
 #include "tests/ray_cases.hpp"
@@ -28,25 +28,19 @@ struct RaysWorld {
             uint group_size = kGroupSize)
       : volume(test_volume),
         frame(make_frame_params(volume.info(), camera, size, isovalue)),
-        stream(device, volume.compressed),
-        macrocells(device, frame, stream),
         rays(device, {.num_rays = size.num_rays(), .with_pairs = false}),
-        cache(
-            device,
+        blocks(
+            device, volume.compressed, DeviceStream(device, volume.compressed),
             BlockCache::limits_for(
                 frame.grid, num_slots != 0 ? num_slots : static_cast<uint>(block_count(frame.grid)),
                 size.num_rays()),
             group_size),
-        decode(device, cache.capacity, stream.defines()),
         start_rays(device, size.num_rays(), group_size),
         march(device, size.num_rays(), group_size, kDefaultSolver),
         request_ahead(device, size.num_rays(), group_size) {
-    macrocells.select(frame);
-    frame.surface = macrocells.surface(frame);
-    frame.screen = make_screen_box(frame);
-    frame.schedule.max_spec_count = spec_count;
-    frame.schedule.table_groups = cache.table_groups;
-    rays.frame = frame;
+    blocks.open(rays, {frame}, {{stream.layout, 0}}, FieldBound::kNone, RaySource::kCamera);
+    rays.frame.schedule.max_spec_count = spec_count;
+    frame = rays.frame;
     const std::vector<uint> masks = macrocells.masks().read();
     for (uint pixel = 0; pixel < size.num_rays(); ++pixel) {
       std::vector<uint> &list = active_blocks.emplace_back(blocks_of_ray(frame, pixel));
@@ -82,10 +76,10 @@ struct RaysWorld {
 
   /// The rays that go on, and the block that each stands at.
   std::map<uint, uint> waiting() const {
-    const std::vector<uint> blocks = rays.ray_block_ids.read();
+    const std::vector<uint> stands = rays.ray_block_ids.read();
     const std::vector<RayEntry> listed = entries();
     std::map<uint, uint> waiting;
-    for (const RayEntry &entry : listed) waiting.emplace(entry.pixel, blocks[entry.pixel]);
+    for (const RayEntry &entry : listed) waiting.emplace(entry.pixel, stands[entry.pixel]);
     EXPECT_EQ(waiting.size(), listed.size()) << "a ray is listed twice";
     return waiting;
   }
@@ -100,11 +94,7 @@ struct RaysWorld {
   }
 
   /// Gives slots and values to the blocks that the pass before asked for.
-  void provide() {
-    cache.evict(rays.previous_counts, rays);
-    cache.assign(rays.previous_counts, rays);
-    decode({stream, rays.frame}, {stream, rays.frame}, rays.counts, cache);
-  }
+  void provide() { blocks.provide(rays.previous_counts, {}, rays); }
 
   /// [blocks] slot of each block, ISO_BLOCK_ABSENT if it is not cached.
   std::vector<uint> slots_by_block() const {
@@ -117,11 +107,11 @@ struct RaysWorld {
 
   const test::TestVolume &volume;
   FrameParams frame;
-  DeviceStream stream;
-  Macrocells macrocells;
   Wavefront rays;
-  BlockCache cache;
-  ZfpDecode decode;
+  BlockStore blocks;
+  DeviceStream &stream = blocks.levels[0].stream;
+  Macrocells &macrocells = blocks.levels[0].macrocells;
+  BlockCache &cache = blocks.cache;
   StartRays start_rays;
   March march;
   RequestAhead request_ahead;

@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "core/ocl/kernel.hpp"
+#include "kernels/shared_types.hpp"
 #include "kernels_cl/portable/shared_types_fields.h"
 #include "tests/test_devices.hpp"
 
@@ -71,14 +71,14 @@ TEST_P(SharedTypesOnDevice, SmallSizesAreTheHosts) {
                                       sizeof(HitRecord),   sizeof(GivenRay), sizeof(StreamLayout),
                                       sizeof(PassCounts)};
   ocl::Buffer<uint> sizes(device_, "sizes", expected.size());
-  ocl::Kernel<ocl::Out<uint>>{device_, "shared_types", "shared_type_sizes"}({1, 1}, sizes);
+  ocl::Kernel<kernels::shared_type_sizes>{device_}({1, 1}, sizes);
   EXPECT_EQ(sizes.read(), expected);
 }
 
 TEST_P(SharedTypesOnDevice, SmallOffsetsAreTheHosts) {
   const std::vector<uint> expected = host_offsets();
   ocl::Buffer<uint> offsets(device_, "offsets", expected.size());
-  ocl::Kernel<ocl::Out<uint>>{device_, "shared_types", "shared_type_offsets"}({1, 1}, offsets);
+  ocl::Kernel<kernels::shared_type_offsets>{device_}({1, 1}, offsets);
   EXPECT_EQ(offsets.read(), expected);
 }
 

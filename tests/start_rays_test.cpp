@@ -25,7 +25,8 @@ class StartRaysOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
 
   /// Returns how many rays start.
   std::size_t expect_start(const test::TestVolume &volume, const Camera &camera, ImageSize size,
-                           float isovalue, uint group_size = RaysWorld::kGroupSize) {
+                           float isovalue, uint group_size = RaysWorld::kGroupSize,
+                           bool begins_frame = true) {
     RaysWorld world(device_, volume, camera, size, isovalue, 4, 0, group_size);
     Wavefront &rays = world.rays;
     const HitRecord stale = {1.0f, 2, 3, 4.0f, 5.0f, 6.0f, 7.0f, 8.0f, 9.0f};
@@ -39,12 +40,15 @@ class StartRaysOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     rays.counts.write({&last, 1});
     rays.next_counts.write({&next, 1});
 
-    world.start_rays(world.macrocells, rays);
+    world.start_rays(world.macrocells, rays, begins_frame);
 
     const std::map<uint, uint> first = world.first_blocks();
     last.next_active_count = static_cast<uint>(first.size());
-    next.frame_pass = kLastPass + 1;
-    next.last_frame_pass = kLastFramePass;
+    if (begins_frame) {
+      next.frame_pass = kLastPass + 1;
+      next.last_frame_pass = kLastFramePass;
+    }
+    next.window_count = static_cast<uint>(size.num_rays());
     expect_counts(rays.counts, last);
     expect_counts(rays.next_counts, next);
     if (HasFailure()) return 0;
@@ -78,6 +82,7 @@ TEST_P(StartRaysOnDevice, SmallPictures) {
   const test::TestVolume volume({10, 9, 11}, test::gyroid_field(11), 8);
   const Camera camera = orbit_cameras(volume.info(), 1).front();
   EXPECT_GT(expect_start(volume, camera, {7, 5}, 0.3f, 8), 3u);
+  EXPECT_GT(expect_start(volume, camera, {7, 5}, 0.3f, 8, false), 3u) << "within a frame";
   EXPECT_EQ(expect_start(volume, camera, {3, 1}, 1e6f, 8), 0u) << "nothing is active";
 }
 

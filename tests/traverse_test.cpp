@@ -97,9 +97,6 @@ double stay_in_block(const FrameParams &frame, const Ray &ray, uint block) {
 
 class TraverseOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
  protected:
-  using TraverseKernel = ocl::Kernel<FrameParams, uint, ocl::In<uint>, ocl::Out<PassCounts>,
-                                     ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>>;
-
   /// The kernel itself, since masks that no isovalue makes are wanted.
   struct Stages {
     Stages(ocl::Device &device, std::uint64_t pixels, uint group_size)
@@ -107,13 +104,13 @@ class TraverseOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
           compaction(device, pixels, 8),
           initial_rays(device, pixels),
           range(ocl::Range::strided(pixels, group_size, device)),
-          kernel(device, "traverse", "traverse", group_defines(group_size)) {}
+          kernel(device, group_defines(group_size)) {}
 
     Wavefront rays;
     Compaction compaction;
     InitialRays initial_rays;
     ocl::Range range;
-    TraverseKernel kernel;
+    ocl::Kernel<kernels::traverse> kernel;
   };
 
   /// Passes of spec_count blocks until every ray has left the volume.

@@ -59,8 +59,8 @@ class ProcessTeam : public core::Team {
 };
 
 /// What a team's renderer needs, in the order in which it is made.
-struct Held {
-  explicit Held(Processes &processes) : team(processes) {}
+struct TeamHeld {
+  explicit TeamHeld(Processes &processes) : team(processes) {}
 
   ProcessTeam team;
   Turns turns;
@@ -82,8 +82,8 @@ std::string text_of(const BrickOptions &options, const core::Storage &storage) {
 }
 
 /// Opens device and volume, at all processes.
-void open(Held &held, const std::string &path, const Compression &compression, const RawFile &raw,
-          const BrickOptions &options) {
+void open(TeamHeld &held, const std::string &path, const Compression &compression,
+          const RawFile &raw, const BrickOptions &options) {
   core::Team &team = held.team;
   core::agree_on(team, "version", std::string(version()));
   core::TeamVolumeSource source;
@@ -115,7 +115,7 @@ Renderer make_team_renderer(Processes &processes, const std::filesystem::path &p
                             const Compression &compression, const RawFile &raw,
                             const BrickOptions &options) {
   return guarded("making a renderer", [&] {
-    const auto held = std::make_shared<Held>(processes);
+    const auto held = std::make_shared<TeamHeld>(processes);
     open(*held, path.string(), compression, raw, options);
     const core::TeamVolume &volume = held->volume.value();
     std::unique_ptr<core::Renderer> renderer;

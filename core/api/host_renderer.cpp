@@ -11,7 +11,7 @@ namespace isowave {
 
 namespace {
 
-struct Held {
+struct HostHeld {
   std::shared_ptr<const Volume> volume;
   Turns turns;  ///< one frame at a time
 };
@@ -22,7 +22,7 @@ Renderer make_host_renderer(std::shared_ptr<const Volume> volume,
                             const HostRendererOptions &options) {
   return core::guarded("making a renderer", [&] {
     if (!volume) throw core::Error("a renderer needs a volume");
-    const auto held = std::make_shared<Held>();
+    const auto held = std::make_shared<HostHeld>();
     held->volume = volume;
     const core::CompressedVolume &compressed = volume->implementation().volume;
     auto result = std::make_unique<CoreImplementation>(

@@ -85,8 +85,8 @@ Extractor::Plan Extractor::plan_for(std::uint64_t num_listed, std::uint64_t num_
   const std::uint64_t surface = blocks_.fixed_bytes() + SurfaceCounts::sizes(num_listed).bytes() +
                                 PrefixSum::sizes(num_listed, ocl::kGroupSize).bytes();
   const std::uint32_t least_slots = blocks_.least_slots();
-  const std::uint64_t least =
-      surface + blocks_.cache_bytes(least_slots) + mesh_bytes(kBlockVertices);
+  const std::uint64_t least = surface + blocks_.cache_bytes(least_slots) +
+                              std::max(blocks_.count_bytes(), mesh_bytes(kBlockVertices));
   if (least > budget) {
     throw Error(
         "a memory budget of {} bytes is too small for the {} blocks of the surface at {}: {} would "
@@ -208,7 +208,7 @@ ExtractStats Extractor::extract(float isovalue, MeshSink &sink, const Progress &
   stats.size.has_normals = options_.with_normals;
   const std::uint32_t num_listed = blocks_.find(isovalue);
   stats.listed_blocks = num_listed;
-  stats.device_bytes = blocks_.fixed_bytes();
+  stats.device_bytes = blocks_.fixed_bytes() + blocks_.cache_bytes(blocks_.num_slots());
   if (num_listed == 0) {
     sink.begin(stats.size);
     stats.total_ms = ms_since(begin);
@@ -216,11 +216,10 @@ ExtractStats Extractor::extract(float isovalue, MeshSink &sink, const Progress &
   }
   // Throws where not even the least fits, before any of it is taken.
   plan_for(num_listed, blocks_of_block(gradients_), isovalue);
-  if (blocks_.num_slots() != 0 && blocks_.fixed_bytes() + blocks_.cache_bytes(blocks_.num_slots()) +
-                                          SurfaceCounts::sizes(num_listed).bytes() +
-                                          blocks_.count_bytes() +
-                                          PrefixSum::sizes(num_listed, ocl::kGroupSize).bytes() >
-                                      blocks_.budget())
+  if (blocks_.fixed_bytes() + blocks_.cache_bytes(blocks_.num_slots()) +
+          SurfaceCounts::sizes(num_listed).bytes() + blocks_.count_bytes() +
+          PrefixSum::sizes(num_listed, ocl::kGroupSize).bytes() >
+      blocks_.budget())
     blocks_.drop_cache();
   Run run{.num_listed = num_listed,
           .surface = SurfaceCounts(device_, num_listed),

@@ -21,6 +21,11 @@ OnHost window_for(const CompressedVolume &volume) {
       std::clamp<std::uint64_t>(volume.block_count(), 1, kWindowBlocks))};
 }
 
+/// All slots may be requested in one pass, whatever number of rays.
+BlockCache::Limits cache_limits(const BlockGrid &grid, std::uint32_t num_slots) {
+  return BlockCache::limits_for(grid, num_slots, ISO_MAX_CACHE_SLOTS);
+}
+
 Wavefront::Limits ray_limits(const SurfaceBlocks::Options &options) {
   return {.num_rays = options.num_rays, .with_pairs = false, .with_walks = false};
 }
@@ -77,43 +82,45 @@ std::uint64_t SurfaceBlocks::default_budget(const ocl::Device &device) {
 
 SurfaceBlocks::SurfaceBlocks(ocl::Device &device, const CompressedVolume &volume,
                              const Options &options)
-    : device_(device),
-      gradients_(options.gradients),
-      frame_(make_grid_params(volume.info)),
+    : gradients_(options.gradients),
+      grid_(make_grid(volume.info)),
       budget_(options.memory_budget),
-      stream_(make_stream(device, volume, options)),
-      macrocells_(device, frame_, stream_),
-      listed_(device, num_macrocells(frame_.grid)),
-      request_(device, gradients_),
-      rays_(device, ray_limits(options)) {
-  fixed_bytes_ = own_sizes(volume, options).bytes() + stream_bytes(volume, stream_, device);
+      store_(device, volume, make_stream(device, volume, options),
+             cache_limits(grid_, least_slots()), ocl::kGroupSize),
+      rays_(device, ray_limits(options)),
+      listed_(device, num_macrocells(grid_)),
+      request_(device, gradients_) {
+  fixed_bytes_ = own_sizes(volume, options).bytes() + stream_bytes(volume, stream(), device);
 }
 
 std::uint32_t SurfaceBlocks::find(float isovalue) {
   if (std::isnan(isovalue)) throw Error("the isovalue is NaN: give a number");
-  frame_.surface.isovalue = isovalue;
-  macrocells_.select(frame_);
-  return listed_.count(frame_, macrocells_.masks());
+  open(isovalue);
+  return listed_.count(frame(), store_.levels[0].macrocells.masks());
+}
+
+void SurfaceBlocks::open(float isovalue) {
+  const Level &level = store_.levels[0];
+  FrameParams frame = make_grid_params(level.info);
+  frame.surface.isovalue = isovalue;
+  store_.open(rays_, {frame}, {{level.stream.layout, level.range_error}}, FieldBound::kNone,
+              RaySource::kGiven);
 }
 
 std::uint64_t SurfaceBlocks::count_bytes() const {
-  return RequestSurface::count_sizes(num_macrocells(frame_.grid)).bytes();
-}
-
-BlockCache::Limits SurfaceBlocks::cache_limits(std::uint32_t num_slots) const {
-  return BlockCache::limits_for(frame_.grid, num_slots, num_slots);
+  return RequestSurface::count_sizes(num_macrocells(grid_)).bytes();
 }
 
 std::uint64_t SurfaceBlocks::cache_bytes(std::uint32_t num_slots) const {
-  const BlockCache::Limits limits = cache_limits(num_slots);
+  const BlockCache::Limits limits = cache_limits(grid_, num_slots);
   return BlockCache::sizes(limits).bytes() +
-         ZfpDecode::sizes(limits.max_requests(), stream_.window != nullptr, false).bytes();
+         ZfpDecode::sizes(limits.max_requests(), stream().window != nullptr, false).bytes();
 }
 
 bool SurfaceBlocks::can_have(std::uint32_t num_slots) const {
   return num_slots <= ISO_MAX_CACHE_SLOTS &&
          ISO_BLOCK_VOXELS * sizeof(float) * std::uint64_t{num_slots} <=
-             device_.capabilities().largest_allocation;
+             store_.device.capabilities().largest_allocation;
 }
 
 std::uint32_t SurfaceBlocks::most_slots(std::uint32_t wanted, std::uint64_t beside) const {
@@ -130,50 +137,30 @@ std::uint32_t SurfaceBlocks::most_slots(std::uint32_t wanted, std::uint64_t besi
 }
 
 void SurfaceBlocks::open_cache(std::uint32_t num_slots) {
-  const float isovalue = frame_.surface.isovalue;
-  const bool is_there = cache_ && cache_->num_slots == num_slots;
-  if (!is_there) {
-    drop_cache();  // before the next one takes its memory
-    cache_.emplace(device_, cache_limits(num_slots), ocl::kGroupSize);
-    decode_.emplace(device_, cache_->capacity, stream_.defines());
-    num_free_ = cache_->num_slots;
-  }
-  frame_.schedule.table_groups = cache_->table_groups;
-  rays_.frame = frame_;
-  if (is_there && cached_isovalue_ != isovalue) cache_->classify(rays_);
-  cached_isovalue_ = isovalue;
+  if (num_slots != this->num_slots()) resize_cache(num_slots);
+  open(frame().surface.isovalue);
 }
 
 void SurfaceBlocks::clear_cache() {
-  if (!cache_) return;
-  cache_->clear();
-  num_free_ = cache_->num_slots;
+  store_.clear();
+  num_cached_ = 0;
 }
 
-void SurfaceBlocks::drop_cache() {
-  cache_.reset();
-  decode_.reset();
-  num_free_ = 0;
+void SurfaceBlocks::resize_cache(std::uint32_t num_slots) {
+  store_.resize(cache_limits(grid_, num_slots), rays_);
+  num_cached_ = 0;
 }
 
 bool SurfaceBlocks::bring(const ocl::Buffer<uint> &block_ids, std::uint32_t begin,
                           std::uint32_t end) {
-  ++pass_;
-  rays_.frame = frame_;
-  // Each batch is a frame of its own, so that slots are freed in the order in which they were used.
-  PassCounts counts{};
-  counts.ray_count = 1;
-  counts.pass = counts.frame_pass = counts.last_frame_pass = pass_;
-  counts.free_count = num_free_;
-  rays_.counts.write({&counts, 1});
-  request_(block_ids, begin, end, *cache_, rays_);
+  rays_.frame = frame();
+  store_.begin_host_pass(rays_);
+  request_(block_ids, begin, end, store_.cache, rays_);
   const std::uint32_t num_requested = rays_.counts.read().front().requested_count;
   if (num_requested == 0) return true;
-  cache_->evict(rays_.counts, rays_);  // if slots are short; and rebuilds a table that gets full
-  cache_->assign(rays_.counts, rays_);
-  (*decode_)({stream_, rays_.frame}, {stream_, rays_.frame}, rays_.counts, *cache_);
-  counts = rays_.counts.read().front();
-  num_free_ = counts.free_count;
+  store_.provide(rays_.counts, {}, rays_);
+  const PassCounts counts = rays_.counts.read().front();
+  num_cached_ = num_slots() - counts.free_count;
   num_decoded_ += counts.decoded_count;
   return counts.decoded_count == num_requested;
 }

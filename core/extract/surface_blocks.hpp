@@ -5,13 +5,10 @@
 //   active blocks -> [ request -> cache -> decode ]*
 
 #include <cstdint>
-#include <optional>
 
-#include "core/render/memory_plan.hpp"
+#include "core/render/block_store.hpp"
 #include "core/stages/active_blocks.hpp"
-#include "core/stages/macrocells.hpp"
 #include "core/stages/request_surface.hpp"
-#include "core/stages/zfp_decode.hpp"
 #include "core/zfp/zfp_stream.hpp"
 
 namespace isowave::core {
@@ -49,13 +46,13 @@ class SurfaceBlocks {
   ///
   /// Out    block_ids [find()]
   /// Waits  no
-  void list(ocl::Buffer<uint> &block_ids) { listed_.list(frame_, block_ids); }
+  void list(ocl::Buffer<uint> &block_ids) { listed_.list(frame(), block_ids); }
   /// How many different blocks the first `count` entries of the list need. Takes count_bytes() of
   /// device memory meanwhile.
   ///
   /// Waits  yes
   std::uint32_t count_needed(const ocl::Buffer<uint> &block_ids, std::uint32_t count) {
-    return request_.count_needed(frame_, block_ids, count);
+    return request_.count_needed(frame(), block_ids, count);
   }
   std::uint64_t count_bytes() const;
 
@@ -72,8 +69,8 @@ class SurfaceBlocks {
   void open_cache(std::uint32_t num_slots);
   /// Forgets all decoded blocks; their slots stay.
   void clear_cache();
-  /// Forgets all decoded blocks, and gives their memory back.
-  void drop_cache();
+  /// Forgets all decoded blocks, and gives their memory back, but for least_slots().
+  void drop_cache() { resize_cache(least_slots()); }
 
   /// Has what the entries [begin, end) of a list need cached. Returns false where that is more than
   /// there are slots: then it is not.
@@ -81,38 +78,31 @@ class SurfaceBlocks {
   /// Waits  yes
   bool bring(const ocl::Buffer<uint> &block_ids, std::uint32_t begin, std::uint32_t end);
 
-  const FrameParams &frame() const { return frame_; }  ///< grid, isovalue
+  const FrameParams &frame() const { return store_.levels[0].frame; }  ///< grid, isovalue
   const ActiveBlocks &listed() const { return listed_; }
-  const DeviceStream &stream() const { return stream_; }
-  const BlockCache &cache() const { return *cache_; }  ///< of open_cache()
-  /// Slots of the cache; 0: there is none.
-  std::uint32_t num_slots() const { return cache_ ? cache_->num_slots : 0; }
-  std::uint32_t num_cached() const { return cache_ ? cache_->num_slots - num_free_ : 0; }
+  const DeviceStream &stream() const { return store_.levels[0].stream; }
+  const BlockCache &cache() const { return store_.cache; }
+  std::uint32_t num_slots() const { return store_.cache.num_slots; }
+  std::uint32_t num_cached() const { return num_cached_; }
   std::uint64_t num_decoded() const { return num_decoded_; }  ///< so far
   std::uint64_t budget() const { return budget_; }
   /// Of all buffers that live as long as this, those of `beside` among them.
   std::uint64_t fixed_bytes() const { return fixed_bytes_; }
   /// The hits of a picture, and what cache and decoder use of frames.
   Wavefront &rays() { return rays_; }
-  Macrocells &macrocells() { return macrocells_; }
 
  private:
-  BlockCache::Limits cache_limits(std::uint32_t num_slots) const;
+  void open(float isovalue);
+  void resize_cache(std::uint32_t num_slots);
 
-  ocl::Device &device_;
   Gradients gradients_;
-  FrameParams frame_;
+  BlockGrid grid_;
   std::uint64_t budget_, fixed_bytes_;
-  DeviceStream stream_;
-  Macrocells macrocells_;
+  BlockStore store_;
+  Wavefront rays_;
   ActiveBlocks listed_;
   RequestSurface request_;
-  Wavefront rays_;
-  std::optional<BlockCache> cache_;
-  std::optional<ZfpDecode> decode_;  ///< for that cache
-  float cached_isovalue_ = 0;        ///< of its bits of voxels inside
-  std::uint32_t num_free_ = 0;       ///< of its slots
-  std::uint32_t pass_ = 1;           ///< the clock of its stamps
+  std::uint32_t num_cached_ = 0;
   std::uint64_t num_decoded_ = 0;
 };
 

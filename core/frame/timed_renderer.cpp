@@ -85,7 +85,7 @@ FrameStats TimedRenderer::render(const FrameRequest &request) {
     step = next;
     step_begin = now;
   }
-  if (step != 0) enlarge_kept(request);
+  if (step != 0) enlarge_kept(request_of(request, 0));
   sum.total_ms = now_ms() - begin;
   return sum;
 }

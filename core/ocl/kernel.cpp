@@ -25,7 +25,7 @@ Range Range::in_parts(std::uint64_t count, const Device &device) const {
   return range;
 }
 
-void RawKernel::make(std::size_t num_params) {
+void RawKernel::make() {
   if (kernel_() != nullptr) return;
   device_->announce_kernel(name_);
   max_group_size_ = std::bit_floor(std::size_t{device_->capabilities().max_work_group_size});
@@ -37,36 +37,29 @@ void RawKernel::make(std::size_t num_params) {
       size = std::min(wanted, max_group_size_);
       known->second = fmt::format("{}u", size);
       if (size < wanted) defines["ISO_GROUP_SHARE"] = fmt::format("{}u", wanted / size);
-      kernel = build(defines, num_params);
+      kernel = build(defines);
     }
   } else {
-    kernel = build(defines, num_params);
+    kernel = build(defines);
   }
   kernel_ = std::move(kernel);
   is_new_ = true;
 }
 
-cl::Kernel RawKernel::build(const Defines &defines, std::size_t num_params) {
+cl::Kernel RawKernel::build(const Defines &defines) {
   const cl::Program &program = device_->program(stem_, defines);
   const Device::Compiling compiling = device_->compiling();  // Mesa compiles some of it here
-  std::size_t num_args = 0;
-  cl::Kernel kernel;
   try {
-    kernel = cl::Kernel(program, name_.c_str());
-    num_args = kernel.getInfo<CL_KERNEL_NUM_ARGS>();
+    cl::Kernel kernel(program, name_.c_str());
     // Its registers may leave room for fewer work-items than the device has for other kernels.
     const std::size_t limit = kernel.getWorkGroupInfo<CL_KERNEL_WORK_GROUP_SIZE>(
         program.getInfo<CL_PROGRAM_DEVICES>()[0]);
     max_group_size_ = std::min(max_group_size_, std::max<std::size_t>(std::bit_floor(limit), 1));
+    return kernel;
   } catch (const cl::Error &error) {
     throw Error("{}.cl gives no kernel '{}': {}: {}", stem_, name_, error.what(),
                 error_name(error.err()));
   }
-  if (num_args != num_params) {
-    throw std::invalid_argument(fmt::format("kernel '{}' takes {} arguments, its C++ type names {}",
-                                            name_, num_args, num_params));
-  }
-  return kernel;
 }
 
 void RawKernel::launch(const Range &range) {

@@ -1,10 +1,11 @@
 #pragma once
 // A kernel whose arguments are checked by the C++ compiler:
 //
-//   Kernel<In<uint>, uint, Out<uint>> scale_{device, "scale", "scale_values"};
-//   scale_(Range::strided(count, 64, device), input, factor, output);
+//   #include "kernels/launch_probe.hpp"  // made from kernels_cl/probes/launch_probe.cl
+//   Kernel<kernels::scale_values> scale_{device};
+//   scale_(Range::strided(count, 64, device), input, count, factor, output);
 //
-// Its program is built when it is first launched, so that what is not used is not built. Whoever
+// Its program is built when it is first launched, so that what is not used is not built. Code that
 // times launches does one before that has nothing to do.
 
 #include <CL/opencl.hpp>
@@ -21,14 +22,14 @@
 
 namespace isowave::core::ocl {
 
-/// Parameter tags for buffers: `global const T *` and `global T *` (or `constant T *`) of the
-/// kernel.
+/// `global const T *` or `constant T *` of a kernel.
 template <class T>
 struct In {
   In(const Buffer<T> &buffer)
       : mem(buffer.mem()) {}  // NOLINT(google-explicit-constructor): tags convert
   const cl::Buffer &mem;
 };
+/// `global T *`, which the kernel may also read.
 template <class T>
 struct Out {
   Out(Buffer<T> &buffer) : mem(buffer.mem()) {}  // NOLINT(google-explicit-constructor)
@@ -81,9 +82,8 @@ class RawKernel {
   /// Makes the kernel, unless that has been done; its program, too. If the device gives the kernel
   /// no groups of ISO_GROUP_SIZE work-items, the kernel is built for smaller ones.
   ///
-  /// Throws  Error: there is none of that name; std::invalid_argument: it has another number of
-  ///         parameters
-  void make(std::size_t num_params);
+  /// Throws  Error: there is none of that name
+  void make();
   /// Enqueues; waits at the first launch, and while a Device::Compiling lives.
   ///
   /// Throws  Error naming kernel and OpenCL error
@@ -108,7 +108,7 @@ class RawKernel {
   void set_mem(cl_uint index, const cl::Buffer &mem);
   void set_bytes(cl_uint index, std::size_t bytes, const void *data);
   /// The kernel, built with these macros. Asks the device how large its groups may be.
-  cl::Kernel build(const Defines &defines, std::size_t num_params);
+  cl::Kernel build(const Defines &defines);
 
   Device *device_;
   std::string stem_, name_;
@@ -118,20 +118,25 @@ class RawKernel {
   bool is_new_ = false;             ///< never launched
 };
 
-/// Params are In<T>, Out<T>, Local<T> or plain scalars, in the order of the kernel's signature. The
-/// first launch checks their number against the built kernel.
-template <class... Params>
-class Kernel : public RawKernel {
+/// A kernel's parameters in order: In<T>, Out<T>, Local<T> or values.
+template <class... Types>
+struct Params {};
+
+template <class Signature, class = typename Signature::Params>
+class Kernel;
+
+/// Signature: one of namespace kernels (tools/cmake/kernel_signatures.cmake).
+template <class Signature, class... Types>
+class Kernel<Signature, Params<Types...>> : public RawKernel {
  public:
-  Kernel(Device &device, std::string_view stem, const char *kernel_name,
-         const Defines &defines = {})
-      : RawKernel(device, stem, kernel_name, defines) {}
+  explicit Kernel(Device &device, const Defines &defines = {})
+      : RawKernel(device, Signature::kStem, Signature::kName, defines) {}
 
   /// Enqueues one launch in queue order; does not wait but at the first one, which counts as
   /// compiling. A range of 0 groups does nothing.
-  void operator()(const Range &range, const std::type_identity_t<Params> &...args) {
+  void operator()(const Range &range, const Types &...args) {
     if (range.num_groups == 0) return;
-    make(sizeof...(Params));
+    make();
     [[maybe_unused]] cl_uint index = 0;  // a kernel may have no parameters
     (this->set(index++, args), ...);
     launch(range);

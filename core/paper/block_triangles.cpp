@@ -11,8 +11,8 @@ ocl::BufferSizes BlockTriangles::sizes() {
 BlockTriangles::BlockTriangles(ocl::Device &device)
     : device_(device),
       cell_triangles_(device, sizes()["cell triangles"]),
-      count_(device, "block_triangles", "block_triangles_count", group_defines(ISO_BLOCK_VOXELS)),
-      write_(device, "block_triangles", "block_triangles_write", group_defines(ISO_BLOCK_VOXELS)) {
+      count_(device, group_defines(ISO_BLOCK_VOXELS)),
+      write_(device, group_defines(ISO_BLOCK_VOXELS)) {
   cell_triangles_.write(cell_triangles());
 }
 

@@ -2,9 +2,9 @@
 // Listed blocks whose values are cached -> triangles with vertices of their own, for drawing
 // (kernels_cl/paper/block_triangles.cl).
 
-#include "core/ocl/kernel.hpp"
 #include "core/stages/block_cache.hpp"
 #include "core/stages/marching_cubes.hpp"
+#include "kernels/block_triangles.hpp"
 #include "kernels_cl/portable/block_vertex.h"
 
 namespace isowave::core {
@@ -45,13 +45,8 @@ class BlockTriangles {
  private:
   ocl::Device &device_;
   ocl::Buffer<uchar> cell_triangles_;
-  ocl::Kernel<FrameParams, uint, uint, uint, ocl::In<uint>, ocl::In<BlockEntry>, ocl::In<ulong>,
-              ocl::In<uchar>, ocl::In<uint>, uint, ocl::Out<uint>>
-      count_;
-  ocl::Kernel<FrameParams, uint, uint, uint, uint, ocl::In<uint>, ocl::In<BlockEntry>,
-              ocl::In<float>, ocl::In<ulong>, ocl::In<uchar>, ocl::In<uint>, uint, ocl::In<uint>,
-              ocl::Out<BlockVertex>>
-      write_;
+  ocl::Kernel<kernels::block_triangles_count> count_;
+  ocl::Kernel<kernels::block_triangles_write> write_;
 };
 
 }  // namespace isowave::core

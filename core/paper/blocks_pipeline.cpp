@@ -26,7 +26,12 @@ class BlocksWave : public Wave {
         traverse_(blocks.device, limits.num_rays, limits.group_size, options.scanned_pairs),
         group_(blocks.device, limits, options.closest),
         intersect_(blocks.device, limits.num_rays, limits.group_size, solver, options.closest),
-        composite_(blocks.device, limits.num_rays, options.closest) {}
+        composite_(blocks.device, limits.num_rays, options.closest) {
+    blocks.on_resize = [this](std::uint32_t num_slots) { group_.resize(num_slots); };
+  }
+  BlocksWave(const BlocksWave &) = delete;
+  BlocksWave &operator=(const BlocksWave &) = delete;
+  ~BlocksWave() override { blocks_.on_resize = {}; }
 
   void begin() override;
   void enqueue_pass() override;
@@ -34,7 +39,6 @@ class BlocksWave : public Wave {
     set_n_spec(stats, stats.counts.active_count);
     stats.visible_blocks = stats.counts.visible_count;
   }
-  void resize_cache(std::uint32_t num_slots) override { group_.resize(num_slots); }
 
  private:
   BlockStore &blocks_;

@@ -4,7 +4,7 @@ namespace isowave::core {
 
 Composite::Composite(ocl::Device &device, std::uint64_t num_rays, ClosestHit closest)
     : range_(ocl::Range::strided(num_rays, ocl::kGroupSize, device)),
-      kernel_(device, "composite", "composite", closest_defines(closest)) {}
+      kernel_(device, closest_defines(closest)) {}
 
 void Composite::operator()(const BlockCache &cache, Wavefront &rays, Compaction &compaction) {
   kernel_(range_, rays.frame, rays.counts, rays.active_ray_ids, rays.pair_block_ids,

@@ -2,11 +2,11 @@
 // The closest of each ray's N_Spec results -> hit buffer; the rays that go on -> the next wavefront
 // (Sec. 4.4).
 
-#include "core/ocl/kernel.hpp"
 #include "core/paper/closest_hit.hpp"
 #include "core/paper/scan.hpp"
 #include "core/stages/block_cache.hpp"
 #include "core/stages/wavefront.hpp"
+#include "kernels/composite.hpp"
 
 namespace isowave::core {
 
@@ -22,10 +22,7 @@ class Composite {
 
  private:
   ocl::Range range_;
-  ocl::Kernel<FrameParams, ocl::Out<PassCounts>, ocl::Out<uint>, ocl::In<uint>, ocl::In<uint>,
-              ocl::In<PairHit>, ocl::In<uint>, ocl::In<BlockEntry>, ocl::In<float>, ocl::Out<uint>,
-              ocl::Out<HitRecord>, ocl::Out<uint>>
-      kernel_;
+  ocl::Kernel<kernels::composite> kernel_;
 };
 
 }  // namespace isowave::core

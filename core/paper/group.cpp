@@ -108,9 +108,9 @@ Group::ByRadix::ByRadix(ocl::Device &device, const Limits &limits, const ocl::Bu
       key_bits(key_bits_for(limits.num_slots)),
       sort(device, limits.num_rays, limits.group_size),
       tile_sums(device, sizes["group tile sums"]),
-      select(device, "group", "group_select", defines),
-      head_sums(device, "group", "group_head_sums", defines),
-      heads(device, "group", "group_heads", defines) {}
+      select(device, defines),
+      head_sums(device, defines),
+      heads(device, defines) {}
 
 void Group::ByRadix::resize(const Limits &limits, const ocl::BufferSizes &, ocl::Device &) {
   key_bits = key_bits_for(limits.num_slots);
@@ -133,9 +133,9 @@ Group::ByCounting::ByCounting(ocl::Device &device, const Limits &limits,
       slot_counts(device, sizes["pairs by slot"]),
       slot_offsets(device, sizes["pair offsets by slot"]),
       candidate_count(device, sizes["group candidates"]),
-      count(device, "group", "group_count", defines),
-      blocks(device, "group", "group_blocks", defines),
-      scatter(device, "group", "group_scatter", defines) {}
+      count(device, defines),
+      blocks(device, defines),
+      scatter(device, defines) {}
 
 void Group::ByCounting::resize(const Limits &limits, const ocl::BufferSizes &sizes,
                                ocl::Device &device) {

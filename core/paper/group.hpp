@@ -4,11 +4,11 @@
 #include <string_view>
 #include <variant>
 
-#include "core/ocl/kernel.hpp"
 #include "core/paper/closest_hit.hpp"
 #include "core/paper/radix_sort.hpp"
 #include "core/stages/block_cache.hpp"
 #include "core/stages/wavefront.hpp"
+#include "kernels/group.hpp"
 
 namespace isowave::core {
 
@@ -70,11 +70,9 @@ class Group {
     std::uint32_t key_bits;
     RadixSort sort;
     ocl::Buffer<uint> tile_sums;
-    ocl::Kernel<FrameParams, ocl::Out<PassCounts>, ocl::In<uint>, ocl::In<BlockEntry>,
-                ocl::In<uint>, ocl::Out<PairHit>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>>
-        select;
-    ocl::Kernel<ocl::In<PassCounts>, ocl::In<uint>, ocl::Out<uint>> head_sums;
-    ocl::Kernel<ocl::Out<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::Out<BlockRays>> heads;
+    ocl::Kernel<kernels::group_select> select;
+    ocl::Kernel<kernels::group_head_sums> head_sums;
+    ocl::Kernel<kernels::group_heads> heads;
   };
 
   struct ByCounting {
@@ -88,16 +86,9 @@ class Group {
     ocl::Buffer<uint> slot_counts;      ///< [slots] 0 between passes
     ocl::Buffer<uint> slot_offsets;     ///< [slots] of blocks that the pass's pairs ask for
     ocl::Buffer<uint> candidate_count;  ///< [1] 0 between passes
-    ocl::Kernel<FrameParams, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<BlockEntry>,
-                ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>>
-        count;
-    ocl::Kernel<FrameParams, ocl::Out<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>,
-                ocl::In<BlockEntry>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<BlockRays>>
-        blocks;
-    ocl::Kernel<FrameParams, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>,
-                ocl::In<uint>, ocl::In<uint>, ocl::Out<PairHit>, ocl::Out<uint>, ocl::Out<uint>,
-                ocl::Out<uint>>
-        scatter;
+    ocl::Kernel<kernels::group_count> count;
+    ocl::Kernel<kernels::group_blocks> blocks;
+    ocl::Kernel<kernels::group_scatter> scatter;
   };
 
   using Gather = std::variant<ByRadix, ByCounting>;

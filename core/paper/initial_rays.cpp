@@ -6,7 +6,7 @@ namespace isowave::core {
 
 InitialRays::InitialRays(ocl::Device &device, std::uint64_t num_rays)
     : range_(ocl::Range::strided(num_rays, ocl::kGroupSize, device).in_parts(num_rays, device)),
-      kernel_(device, "initial_rays", "initial_rays") {}
+      kernel_(device) {}
 
 void InitialRays::operator()(Wavefront &rays, Compaction &compaction) {
   kernel_(range_, rays.frame, range_.parts, rays.hits, rays.ray_block_ids, rays.active_ray_ids,

@@ -1,9 +1,9 @@
 #pragma once
 // Camera -> the first block of every pixel's ray and the first wavefront (Sec. 3.2).
 
-#include "core/ocl/kernel.hpp"
 #include "core/paper/scan.hpp"
 #include "core/stages/wavefront.hpp"
+#include "kernels/initial_rays.hpp"
 
 namespace isowave::core {
 
@@ -18,9 +18,7 @@ class InitialRays {
 
  private:
   ocl::Range range_;
-  ocl::Kernel<FrameParams, uint, ocl::Out<HitRecord>, ocl::Out<uint>, ocl::Out<uint>,
-              ocl::Out<uint>, ocl::Out<PassCounts>>
-      kernel_;
+  ocl::Kernel<kernels::initial_rays> kernel_;
 };
 
 }  // namespace isowave::core

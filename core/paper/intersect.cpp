@@ -18,10 +18,9 @@ ocl::Defines intersect_defines(std::uint32_t group_size, Solver solver, ClosestH
 Intersect::Intersect(ocl::Device &device, std::uint64_t num_rays, std::uint32_t group_size,
                      Solver solver, ClosestHit closest)
     : range_(ocl::Range::strided(num_rays, group_size, device).in_parts(num_rays, device)),
-      kernel_(device, "intersect", "intersect", intersect_defines(group_size, solver, closest)) {
+      kernel_(device, intersect_defines(group_size, solver, closest)) {
   if (solver.kind == ISO_SOLVER_BERNSTEIN) {
-    settle_doubts_.emplace(device, "intersect", "settle_doubts",
-                           intersect_defines(group_size, solver, closest));
+    settle_doubts_.emplace(device, intersect_defines(group_size, solver, closest));
   }
 }
 

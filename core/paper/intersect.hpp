@@ -4,9 +4,9 @@
 #include <optional>
 
 #include "core/frame/solvers.hpp"
-#include "core/ocl/kernel.hpp"
 #include "core/paper/group.hpp"
 #include "core/stages/wavefront.hpp"
+#include "kernels/intersect.hpp"
 
 namespace isowave::core {
 
@@ -21,15 +21,9 @@ class Intersect {
 
  private:
   ocl::Range range_;
-  ocl::Kernel<FrameParams, uint, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<BlockRays>,
-              ocl::In<uint>, ocl::In<BlockEntry>, ocl::In<float>, ocl::In<uint>, ocl::In<uint>,
-              ocl::Out<PairHit>, ocl::Out<uint>>
-      kernel_;
+  ocl::Kernel<kernels::intersect> kernel_;
   /// Only a solver that can be in doubt has it.
-  std::optional<ocl::Kernel<FrameParams, uint, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>,
-                            ocl::In<BlockEntry>, ocl::In<float>, ocl::In<uint>, ocl::In<uint>,
-                            ocl::Out<PairHit>, ocl::Out<uint>>>
-      settle_doubts_;
+  std::optional<ocl::Kernel<kernels::settle_doubts>> settle_doubts_;
 };
 
 }  // namespace isowave::core

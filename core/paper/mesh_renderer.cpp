@@ -90,7 +90,7 @@ std::uint64_t MeshRenderer::mesh_bytes() const {
 std::uint64_t MeshRenderer::bytes_in_use() const {
   return blocks_.fixed_bytes() + mesh_bytes() +
          (lists_ ? Lists::sizes(lists_->block_ids.size()).bytes() : 0) +
-         (blocks_.num_slots() != 0 ? blocks_.cache_bytes(blocks_.num_slots()) : 0);
+         blocks_.cache_bytes(blocks_.num_slots());
 }
 
 /// Lists the blocks of the surface; the lists grow, or within a budget are made as long as needed.
@@ -99,10 +99,9 @@ void MeshRenderer::make_lists() {
   if (is_bounded) {
     mesh_.reset();
     lists_.reset();
-    const std::uint64_t least =
-        blocks_.fixed_bytes() + list_bytes() +
-        std::max(blocks_.count_bytes(),
-                 blocks_.cache_bytes(blocks_.least_slots()) + vertex_bytes(kBlockTriangles));
+    const std::uint64_t least = blocks_.fixed_bytes() + list_bytes() +
+                                blocks_.cache_bytes(blocks_.least_slots()) +
+                                std::max(blocks_.count_bytes(), vertex_bytes(kBlockTriangles));
     if (least > blocks_.budget()) {
       throw Error(
           "a memory budget of {} bytes is too small for the {} blocks of the surface at {}: {} "
@@ -185,8 +184,7 @@ void MeshRenderer::find_surface(float isovalue) {
   }
   make_lists();
   num_needed_ = blocks_.count_needed(lists_->block_ids, num_listed_);
-  const std::uint64_t slots =
-      std::max<std::uint64_t>({num_needed_, blocks_.num_slots(), blocks_.least_slots()});
+  const std::uint64_t slots = std::max<std::uint64_t>(num_needed_, blocks_.num_slots());
   const auto refuse = [&](std::uint64_t bytes) {
     throw Error(
         "the surface at {} takes {} bytes on the device, more than it has, or in one buffer: "

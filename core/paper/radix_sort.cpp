@@ -41,9 +41,9 @@ RadixSort::RadixSort(ocl::Device &device, std::size_t max_count, std::uint32_t g
       other_keys_(device, sizes(max_count, group_size)["sort keys, other half"]),
       other_values_(device, sizes(max_count, group_size)["sort values, other half"]),
       table_(device, sizes(max_count, group_size)["sort digit table"]),
-      histogram_(device, "radix_sort", "radix_histogram", radix_defines(group_size, ranking)),
-      scan_(device, "radix_sort", "radix_scan", radix_defines(group_size, ranking)),
-      scatter_(device, "radix_sort", "radix_scatter", radix_defines(group_size, ranking)) {}
+      histogram_(device, radix_defines(group_size, ranking)),
+      scan_(device, radix_defines(group_size, ranking)),
+      scatter_(device, radix_defines(group_size, ranking)) {}
 
 RadixSort::RadixSort(ocl::Device &device, std::size_t max_count, std::uint32_t group_size)
     : RadixSort(device, max_count, group_size, ranking_for(device)) {}

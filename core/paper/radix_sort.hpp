@@ -1,8 +1,8 @@
 #pragma once
 // Stable radix sort of (key, value) pairs on the device (Sec. 3.6).
 
-#include "core/ocl/kernel.hpp"
 #include "core/stages/device_counts.hpp"
+#include "kernels/radix_sort.hpp"
 
 namespace isowave::core {
 
@@ -38,11 +38,9 @@ class RadixSort {
   std::uint32_t group_size_;
   ocl::Range tiles_range_;
   ocl::Buffer<uint> other_keys_, other_values_, table_;
-  ocl::Kernel<ocl::In<uint>, ocl::In<PassCounts>, uint, uint, uint, ocl::Out<uint>> histogram_;
-  ocl::Kernel<ocl::In<PassCounts>, uint, uint, ocl::Out<uint>> scan_;
-  ocl::Kernel<ocl::In<uint>, ocl::In<uint>, ocl::In<PassCounts>, uint, uint, uint, ocl::In<uint>,
-              ocl::Out<uint>, ocl::Out<uint>>
-      scatter_;
+  ocl::Kernel<kernels::radix_histogram> histogram_;
+  ocl::Kernel<kernels::radix_scan> scan_;
+  ocl::Kernel<kernels::radix_scatter> scatter_;
 };
 
 }  // namespace isowave::core

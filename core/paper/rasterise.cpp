@@ -54,10 +54,10 @@ Rasterise::Rasterise(ocl::Device &device, std::uint64_t num_rays)
       depth_(device, sizes(num_rays)["nearest depths"]),
       triangles_(device, sizes(num_rays)["nearest triangles"]),
       listed_(device, sizes(num_rays)["large triangles"]),
-      clear_(device, "rasterise", "raster_clear", group_defines(ocl::kGroupSize)),
-      part_(device, "rasterise", "raster_part", group_defines(ocl::kGroupSize)),
-      list_(device, "rasterise", "raster_listed", group_defines(ocl::kGroupSize)),
-      hits_(device, "rasterise", "raster_hits", group_defines(ocl::kGroupSize)) {}
+      clear_(device, group_defines(ocl::kGroupSize)),
+      part_(device, group_defines(ocl::kGroupSize)),
+      list_(device, group_defines(ocl::kGroupSize)),
+      hits_(device, group_defines(ocl::kGroupSize)) {}
 
 void Rasterise::clear(Wavefront &rays) {
   const View &view = rays.frame.view;

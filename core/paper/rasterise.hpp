@@ -2,9 +2,9 @@
 // Triangles -> hit buffer (kernels_cl/paper/rasterise.cl): what Block-Compressed Marching Cubes has
 // drawn by the graphics pipeline, as OpenCL kernels, with the same bits on every device.
 
-#include "core/ocl/kernel.hpp"
 #include "core/stages/wavefront.hpp"
 #include "core/view/frame.hpp"
+#include "kernels/rasterise.hpp"
 #include "kernels_cl/portable/raster.h"
 
 namespace isowave::core {
@@ -41,15 +41,10 @@ class Rasterise {
   RasterView view_{};
   ocl::Buffer<uint> depth_, triangles_;  ///< [rays]
   ocl::Buffer<uint> listed_;             ///< how many large triangles, then these
-  ocl::Kernel<FrameParams, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<HitRecord>> clear_;
-  ocl::Kernel<FrameParams, RasterView, uint, uint, ocl::In<BlockVertex>, ocl::Out<uint>,
-              ocl::Out<uint>, uint, ocl::Out<uint>>
-      part_;
-  ocl::Kernel<FrameParams, RasterView, uint, ocl::In<BlockVertex>, ocl::Out<uint>, ocl::Out<uint>,
-              uint, ocl::In<uint>>
-      list_;
-  ocl::Kernel<FrameParams, RasterView, ocl::In<BlockVertex>, ocl::Out<uint>, ocl::Out<HitRecord>>
-      hits_;
+  ocl::Kernel<kernels::raster_clear> clear_;
+  ocl::Kernel<kernels::raster_part> part_;
+  ocl::Kernel<kernels::raster_listed> list_;
+  ocl::Kernel<kernels::raster_hits> hits_;
 };
 
 }  // namespace isowave::core

@@ -47,14 +47,12 @@ Resident::Resident(ocl::Device &device, const CompressedVolume &volume, ImageSiz
       inside_(device, sizes["voxels inside"]),
       changing_(device, sizes["changing cells"]),
       hits_(device, sizes["hits"]),
-      inside_kernel_(device, "resident", "resident_inside", resident_defines(solver)),
-      changing_kernel_(device, "resident", "resident_changing", resident_defines(solver)),
-      kernel_(device, "resident", "resident", resident_defines(solver)) {
+      inside_kernel_(device, resident_defines(solver)),
+      changing_kernel_(device, resident_defines(solver)),
+      kernel_(device, resident_defines(solver)) {
   ocl::Defines decode_defines = resident_defines(solver);
   decode_defines.merge(stream.defines());
-  ocl::Kernel<ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>,
-              StreamLayout, uint, uint, ocl::Out<float>>
-      decode(device, "resident", "resident_decode", decode_defines);
+  ocl::Kernel<kernels::resident_decode> decode(device, decode_defines);
   for (std::uint32_t first = 0; first < num_blocks_; first += kBlocksPerLaunch) {
     const std::uint32_t count = std::min(kBlocksPerLaunch, num_blocks_ - first);
     decode(ocl::Range::strided(count, ocl::kGroupSize, device), stream.part(0), stream.part(1),

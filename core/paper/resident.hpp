@@ -11,6 +11,7 @@
 #include "core/stages/zfp_decode.hpp"
 #include "core/view/frame.hpp"
 #include "core/zfp/zfp_stream.hpp"
+#include "kernels/resident.hpp"
 
 namespace isowave::core {
 
@@ -57,10 +58,9 @@ class Resident {
   ocl::Buffer<ulong> inside_;    ///< [num_blocks]
   ocl::Buffer<ulong> changing_;  ///< [num_blocks]
   ocl::Buffer<HitRecord> hits_;  ///< [pixels]
-  ocl::Kernel<FrameParams, uint, ocl::In<float>, ocl::Out<ulong>> inside_kernel_;
-  ocl::Kernel<FrameParams, uint, ocl::In<ulong>, ocl::Out<ulong>> changing_kernel_;
-  ocl::Kernel<FrameParams, ocl::In<uint>, ocl::In<float>, ocl::In<ulong>, ocl::Out<HitRecord>>
-      kernel_;
+  ocl::Kernel<kernels::resident_inside> inside_kernel_;
+  ocl::Kernel<kernels::resident_changing> changing_kernel_;
+  ocl::Kernel<kernels::resident> kernel_;
 };
 
 }  // namespace isowave::core

@@ -16,8 +16,7 @@ std::uint32_t scan_group_size(const ocl::Device &device, std::uint32_t group_siz
 }  // namespace
 
 ExclusiveScan::ExclusiveScan(ocl::Device &device, std::uint32_t group_size)
-    : group_size_(scan_group_size(device, group_size)),
-      scan_(device, "scan", "scan_exclusive", group_defines(group_size_)) {}
+    : group_size_(scan_group_size(device, group_size)), scan_(device, group_defines(group_size_)) {}
 
 void ExclusiveScan::operator()(ocl::Buffer<uint> &values, CountsBuffer &counts, uint count_field,
                                uint divisor, uint total_field) {
@@ -33,8 +32,8 @@ Compaction::Compaction(ocl::Device &device, std::size_t max_count, std::uint32_t
     : tile_(group_size * ISO_SCAN_ITEMS),
       tile_offsets_(device, sizes(max_count, group_size)["scan tile sums"]),
       scan_(device, group_size),
-      count_(device, "scan", "compact_count", group_defines(group_size)),
-      values_(device, "scan", "compact_values", group_defines(group_size)) {
+      count_(device, group_defines(group_size)),
+      values_(device, group_defines(group_size)) {
   range_ =
       ocl::Range::strided((max_count + ISO_SCAN_ITEMS - 1) / ISO_SCAN_ITEMS, group_size, device);
 }

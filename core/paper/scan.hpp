@@ -2,8 +2,8 @@
 // Exclusive prefix sum and stream compaction with counts that live on the device (Sec. 3.6, 4.2).
 // In: a table or a mask; out: sums or the kept entries in order.
 
-#include "core/ocl/kernel.hpp"
 #include "core/stages/device_counts.hpp"
+#include "kernels/scan.hpp"
 
 namespace isowave::core {
 
@@ -23,7 +23,7 @@ class ExclusiveScan {
 
  private:
   std::uint32_t group_size_;
-  ocl::Kernel<ocl::Out<uint>, ocl::Out<PassCounts>, uint, uint, uint> scan_;
+  ocl::Kernel<kernels::scan_exclusive> scan_;
 };
 
 /// Keeps the entries whose mask is not 0, in order.
@@ -47,10 +47,8 @@ class Compaction {
   std::uint32_t tile_;  ///< entries per tile
   ocl::Buffer<uint> tile_offsets_;
   ExclusiveScan scan_;
-  ocl::Kernel<ocl::In<uint>, ocl::In<PassCounts>, uint, ocl::Out<uint>> count_;
-  ocl::Kernel<ocl::In<uint>, ocl::In<uint>, ocl::In<PassCounts>, uint, ocl::In<uint>,
-              ocl::Out<uint>>
-      values_;
+  ocl::Kernel<kernels::compact_count> count_;
+  ocl::Kernel<kernels::compact_values> values_;
 };
 
 }  // namespace isowave::core

@@ -2,14 +2,14 @@
 // How many blocks each ray looks ahead in a pass (Sec. 4): N_Spec = min(max, floor(W H / N_Act)),
 // computed on the device.
 
-#include "core/ocl/kernel.hpp"
 #include "core/stages/wavefront.hpp"
+#include "kernels/speculation.hpp"
 
 namespace isowave::core {
 
 class Speculation {
  public:
-  explicit Speculation(ocl::Device &device) : begin_pass_(device, "speculation", "begin_pass") {}
+  explicit Speculation(ocl::Device &device) : begin_pass_(device) {}
 
   /// Opens a pass: the rays left by the last one become active.
   ///
@@ -22,7 +22,7 @@ class Speculation {
   }
 
  private:
-  ocl::Kernel<FrameParams, ocl::Out<PassCounts>, ocl::Out<PassCounts>> begin_pass_;
+  ocl::Kernel<kernels::begin_pass> begin_pass_;
 };
 
 }  // namespace isowave::core

@@ -23,7 +23,7 @@ ocl::BufferSizes Traverse::sizes(std::uint64_t num_rays, std::uint32_t group_siz
 Traverse::Traverse(ocl::Device &device, std::uint64_t num_rays, std::uint32_t group_size,
                    bool scanned_pairs)
     : range_(ocl::Range::strided(num_rays, group_size, device).in_parts(num_rays, device)),
-      kernel_(device, "traverse", "traverse", traverse_defines(group_size, false)) {
+      kernel_(device, traverse_defines(group_size, false)) {
   if (scanned_pairs)
     scanned_.emplace(device, sizes(num_rays, group_size, scanned_pairs), group_size);
 }
@@ -41,11 +41,11 @@ Traverse::Scanned::Scanned(ocl::Device &device, const ocl::BufferSizes &sizes,
       histogram(device, sizes["rays by blocks ahead"]),
       tile_sums(device, sizes["pair tile sums"]),
       scan(device, group_size),
-      count(device, "traverse", "traverse_count", traverse_defines(group_size, true)),
-      share(device, "traverse", "traverse_share", traverse_defines(group_size, true)),
-      tiles(device, "traverse", "traverse_tiles", traverse_defines(group_size, true)),
-      begins(device, "traverse", "traverse_begins", traverse_defines(group_size, true)),
-      find(device, "traverse", "traverse_scanned", traverse_defines(group_size, true)) {}
+      count(device, traverse_defines(group_size, true)),
+      share(device, traverse_defines(group_size, true)),
+      tiles(device, traverse_defines(group_size, true)),
+      begins(device, traverse_defines(group_size, true)),
+      find(device, traverse_defines(group_size, true)) {}
 
 void Traverse::Scanned::operator()(const ocl::Range &range, const Macrocells &macrocells,
                                    Wavefront &rays) {

@@ -3,10 +3,10 @@
 
 #include <optional>
 
-#include "core/ocl/kernel.hpp"
 #include "core/paper/scan.hpp"
 #include "core/stages/macrocells.hpp"
 #include "core/stages/wavefront.hpp"
+#include "kernels/traverse.hpp"
 
 namespace isowave::core {
 
@@ -36,21 +36,15 @@ class Traverse {
     ocl::Buffer<uint> histogram;  ///< [ISO_MAX_SPECULATION + 1] 0 between passes
     ocl::Buffer<uint> tile_sums;
     ExclusiveScan scan;
-    ocl::Kernel<FrameParams, uint, ocl::In<uint>, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>,
-                ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>>
-        count;
-    ocl::Kernel<FrameParams, ocl::Out<PassCounts>, ocl::Out<uint>> share;
-    ocl::Kernel<ocl::In<PassCounts>, ocl::In<uint>, ocl::Out<uint>> tiles;
-    ocl::Kernel<ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::Out<uint>> begins;
-    ocl::Kernel<FrameParams, uint, ocl::In<uint>, ocl::Out<PassCounts>, ocl::In<uint>,
-                ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>>
-        find;
+    ocl::Kernel<kernels::traverse_count> count;
+    ocl::Kernel<kernels::traverse_share> share;
+    ocl::Kernel<kernels::traverse_tiles> tiles;
+    ocl::Kernel<kernels::traverse_begins> begins;
+    ocl::Kernel<kernels::traverse_scanned> find;
   };
 
   ocl::Range range_;
-  ocl::Kernel<FrameParams, uint, ocl::In<uint>, ocl::Out<PassCounts>, ocl::In<uint>, ocl::Out<uint>,
-              ocl::Out<uint>, ocl::Out<uint>>
-      kernel_;
+  ocl::Kernel<kernels::traverse> kernel_;
   std::optional<Scanned> scanned_;
 };
 

@@ -14,6 +14,22 @@ namespace isowave::core {
 
 namespace {
 
+/// Caches of fewer slots may run out of them within one pass, unless they are made for what a frame
+/// needs (MemoryPlan::can_grow()), or for all blocks.
+constexpr std::uint32_t kSmallCache = 1u << 16;
+/// Slots are scarce where fewer than one of so many are free.
+constexpr std::uint32_t kScarcePart = 8;
+
+/// A frame that freed more slots than these of blocks that it had asked for leaves nothing of use
+/// to the next. What is left of a ray's blocks makes it wait once for each that is gone. To a GPU
+/// such passes cost more than decoding all anew: H100, 512^3, frames that come again take 1.2 ms
+/// with 90,000 slots, 1.4 with 85,000 and 1.9 with 70,000 where blocks are kept, cold ones 1.3.
+/// Where blocks take longer, since a CPU decodes them or they must be uploaded first, more are
+/// worth keeping: PoCL, 80,000 and 65,536 slots, 123 and 138 ms, cold 154 and 146.
+std::uint32_t most_recycled(std::uint32_t num_slots, ocl::DeviceType type, StreamPlace stream) {
+  return num_slots / (type == ocl::DeviceType::kCpu || stream == StreamPlace::kHost ? 2 : 8);
+}
+
 std::vector<Level> make_levels(ocl::Device &device, const CompressedVolume &volume,
                                const RendererOptions &options, const MemoryPlan &plan) {
   if (volume.info.brick != BrickOf{}) device.draw_bricks();
@@ -52,23 +68,44 @@ std::vector<Level> make_levels(ocl::Device &device, const CompressedVolume &volu
   return levels;
 }
 
+std::vector<Level> make_level(ocl::Device &device, const CompressedVolume &volume,
+                              DeviceStream stream, const BlockCache::Limits &limits) {
+  Macrocells macrocells(device, make_grid_params(volume.info), stream);
+  ZfpDecode decode(device, limits.max_requests(), stream.defines());
+  std::vector<Level> levels;
+  levels.push_back({volume.info, volume.precision, LevelError(volume, true), std::move(stream),
+                    std::move(macrocells), std::move(decode)});
+  return levels;
+}
+
 }  // namespace
 
-BlockStore::BlockStore(ocl::Device &of, const CompressedVolume &volume,
-                       const RendererOptions &options, const MemoryPlan &plan)
+BlockStore::BlockStore(ocl::Device &of, const CompressedVolume &volume, DeviceStream stream,
+                       const BlockCache::Limits &limits, std::uint32_t group_size)
     : device(of),
+      levels(make_level(of, volume, std::move(stream), limits)),
+      cache(of, limits, group_size) {}
+
+BlockStore::BlockStore(ocl::Device &of, const CompressedVolume &volume,
+                       const RendererOptions &options, MemoryPlan made_by)
+    : device(of),
+      plan(std::move(made_by)),
       levels(make_levels(of, volume, options, plan)),  // before the cache, see plan.setup_bytes
       cache(of, plan.limits.cache, options.group_size, levels.size() > 1) {
   schedule_ = {.max_spec_count = options.max_speculation,
                .per_ray_speculation = options.per_ray_speculation,
                .table_groups = cache.table_groups,
                .scanned_pairs = 0};
+  wanted_slots_ = plan.cache_slots;
+  is_small_ = plan.cache_slots < kSmallCache && !plan.can_grow() &&
+              plan.cache_slots < plan.limits.cache.num_blocks;
   level_frames->reserve(levels.size());  // they never move while they are written
 }
 
 void BlockStore::open(Wavefront &rays, std::vector<FrameParams> frames,
                       const std::vector<DecodedValues> &values, FieldBound bound,
                       RaySource source) {
+  grow(rays);
   const float isovalue = frames.front().surface.isovalue;
   levels[0].macrocells.use(static_cast<std::size_t>(bound));
   decode_as(values);
@@ -115,10 +152,17 @@ void BlockStore::decode_as(const std::vector<DecodedValues> &values) {
   if (changes) clear();
 }
 
+void BlockStore::begin_host_pass(Wavefront &rays) {
+  PassCounts counts{};
+  counts.ray_count = 1;
+  counts.pass = counts.frame_pass = counts.last_frame_pass = rays.counts.read().front().pass + 1;
+  rays.counts.write({&counts, 1});
+}
+
 void BlockStore::provide(const CountsBuffer &asked, LevelRange of, Wavefront &rays) {
   {
     const auto stage = device.timer().stage("cache");
-    if (slots_are_scarce) cache.evict(asked, rays);
+    if (slots_are_scarce_) cache.evict(asked, rays);
     cache.assign(asked, rays);
   }
   const auto stage = device.timer().stage("decode");
@@ -138,6 +182,46 @@ void BlockStore::provide(const CountsBuffer &asked, LevelRange of, Wavefront &ra
   }
 }
 
+void BlockStore::note(const PassCounts &counts) {
+  // A launch that is not needed costs more than a pass that finds slots missing now and then. The
+  // counts are a pass old: its requests have taken slots since, and the pass after it may have
+  // asked for as many.
+  const std::uint64_t spoken_for = 2 * std::uint64_t{counts.requested_count};
+  slots_are_scarce_ =
+      is_small_ ||
+      counts.free_count < std::max<std::uint64_t>(cache.num_slots / kScarcePart, spoken_for);
+}
+
+void BlockStore::close(std::uint64_t recycled, bool goes_on) {
+  if (!goes_on && recycled > most_recycled(cache.num_slots, device.info().type, plan.stream))
+    clear();
+  wanted_slots_ = std::max(wanted_slots_, grown_cache_slots(plan, recycled));
+}
+
+/// Between frames: a cache of wanted_slots_, without a block. What there was is freed first, so
+/// that the plan is kept. Where the device has not so much memory after all, the cache stays as
+/// large as it was, or becomes smaller, and never grows again; pictures do not depend on it.
+void BlockStore::grow(Wavefront &rays) {
+  if (wanted_slots_ == plan.cache_slots) return;
+  const std::uint32_t before = plan.cache_slots;
+  for (std::uint32_t slots = wanted_slots_;;) {
+    try {
+      MemoryPlan grown = resized(plan, slots);
+      resize(grown.limits.cache, rays);
+      plan = std::move(grown);
+      break;
+    } catch (const Error &) {
+      if (slots == kMinCacheSlots) throw;
+      slots = slots > before ? before : std::max(slots / 2, kMinCacheSlots);
+    }
+  }
+  if (plan.cache_slots != wanted_slots_) {
+    plan.most_slots = plan.cache_slots;
+    is_small_ |= plan.cache_slots < std::min(before, kSmallCache);
+  }
+  wanted_slots_ = plan.cache_slots;
+}
+
 void BlockStore::clear() {
   cache.clear();
   cached_isovalue_.reset();
@@ -146,8 +230,9 @@ void BlockStore::clear() {
 void BlockStore::resize(const BlockCache::Limits &limits, Wavefront &rays) {
   cache.resize(limits);
   for (Level &level : levels) level.decode.resize(limits.max_requests());
+  if (on_resize) on_resize(limits.num_slots);
   rays.reset_counts();
-  slots_are_scarce = true;
+  slots_are_scarce_ = true;
   cached_isovalue_.reset();
   forget_requests();
 }

@@ -1,9 +1,10 @@
 #pragma once
 // The blocks of a volume on a device: compressed, by level of detail, and decoded, in a cache. The
 // store remembers what the last pass asked for, so that the next one finds it decoded, whichever
-// wave both belong to.
+// wave both belong to; and what a frame lacked, so that the cache grows before the next.
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -48,24 +49,29 @@ struct Uploads {
 
 class BlockStore {
  public:
-  /// made: the finest level first.
-  BlockStore(ocl::Device &of, std::vector<Level> made, BlockCache empty)
-      : device(of), levels(std::move(made)), cache(std::move(empty)) {}
+  /// The finest level alone, for whoever knows how many slots it takes.
+  ///
+  /// volume  of `stream`, which is on the device or on its way there
+  /// Waits   yes
+  BlockStore(ocl::Device &of, const CompressedVolume &volume, DeviceStream stream,
+             const BlockCache::Limits &limits, std::uint32_t group_size);
 
   /// Uploads the volume, if it goes to the device, and computes the value ranges of its blocks.
   ///
   /// Throws  Error: the device's memory does not suffice; a file states wrong ranges of values
   /// Waits   yes
   BlockStore(ocl::Device &of, const CompressedVolume &volume, const RendererOptions &options,
-             const MemoryPlan &plan);
+             MemoryPlan made_by);
 
-  /// Opens a frame: levels and their active blocks become the frame's, decoded values those that it
-  /// asks for. Sets rays.frame and rays.level_frames.
+  /// Opens a frame: the cache grows if the frame before lacked slots; levels and their active
+  /// blocks become the frame's, decoded values those that it asks for. Sets rays.frame and
+  /// rays.level_frames.
   ///
   /// frames  of all levels
   /// values  of all levels; if others are cached, the cache is cleared
   /// source  of the frame's first wave
-  /// Waits   no
+  /// Throws  Error: the device has no memory for a cache of any size
+  /// Waits   if the cache grows
   void open(Wavefront &rays, std::vector<FrameParams> frames,
             const std::vector<DecodedValues> &values, FieldBound bound, RaySource source);
 
@@ -77,6 +83,12 @@ class BlockStore {
   void provide(Wavefront &rays) {
     if (asked_) provide(rays.previous_counts, *asked_, rays);
   }
+  /// Begins a pass whose requests the host makes, and which is a frame of its own: slots are freed
+  /// in the order in which such passes have used them.
+  ///
+  /// Out    rays.counts
+  /// Waits  yes
+  void begin_host_pass(Wavefront &rays);
   /// The same for requests that `asked` counts, of those levels.
   void provide(const CountsBuffer &asked, LevelRange of, Wavefront &rays);
 
@@ -87,27 +99,44 @@ class BlockStore {
   /// Blocks may have been asked for that have not been provided.
   bool has_requests() const { return asked_.has_value(); }
 
+  /// Takes note of what a pass has left: whether the next ones may run out of slots.
+  void note(const PassCounts &counts);
+  /// Closes a frame, or a part of one.
+  ///
+  /// recycled     slots that it has freed of blocks that it had asked for itself: if they are many,
+  ///              the cache grows at the next open()
+  /// goes_on      the next frame goes on with its blocks. If it does not, and what is left of them
+  ///              would slow the next frame down, the cache is emptied.
+  /// Waits        no
+  void close(std::uint64_t recycled, bool goes_on);
+
   /// Empties the cache.
   ///
   /// Waits  no
   void clear();
   /// As BlockCache::resize(), with what depends on it. No ray of the frame before is left.
   void resize(const BlockCache::Limits &limits, Wavefront &rays);
+  /// What has to follow when the number of slots becomes another one. It may throw Error.
+  std::function<void(std::uint32_t num_slots)> on_resize;
   /// What was uploaded since the store was made, of a volume that stays on the host.
   Uploads uploads() const;
 
   ocl::Device &device;
+  MemoryPlan plan;  ///< of the renderer, with the slots that the cache has now
   std::vector<Level> levels;
   BlockCache cache;
   LevelRange drawing{};  ///< the frame at work
   /// Parameters of the levels that draw the frame at work.
   ocl::InFlight<std::vector<FrameParams>> level_frames{device};
-  bool slots_are_scarce = true;  ///< free slots may not suffice for the next passes
-  bool counts_touched = false;   ///< passes count the blocks that they touch, see BlockCache
+  bool counts_touched = false;  ///< passes count the blocks that they touch, see BlockCache
 
  private:
+  void grow(Wavefront &rays);
   void decode_as(const std::vector<DecodedValues> &values);
 
+  std::uint32_t wanted_slots_ = 0;        ///< from the next frame on
+  bool is_small_ = false;                 ///< slots may run out within one pass
+  bool slots_are_scarce_ = true;          ///< free slots may not suffice for the next passes
   Schedule schedule_{};                   ///< of every frame, but for table_groups
   std::optional<LevelRange> asked_;       ///< levels whose blocks the last pass may have asked for
   std::optional<float> cached_isovalue_;  ///< of the cache's bits of voxels inside; none: empty

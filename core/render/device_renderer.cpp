@@ -20,22 +20,6 @@ namespace isowave::core {
 
 namespace {
 
-/// Caches of fewer slots may run out of them within one pass, unless they are made for what a frame
-/// needs (MemoryPlan::can_grow()), or for all blocks.
-constexpr std::uint32_t kSmallCache = 1u << 16;
-/// Slots are scarce where fewer than one of so many are free.
-constexpr std::uint32_t kScarcePart = 8;
-
-/// A frame that freed more slots than these of blocks that it had asked for leaves nothing of use
-/// to the next. What is left of a ray's blocks makes it wait once for each that is gone. To a GPU
-/// such passes cost more than decoding all anew: H100, 512^3, frames that come again take 1.2 ms
-/// with 90,000 slots, 1.4 with 85,000 and 1.9 with 70,000 where blocks are kept, cold ones 1.3.
-/// Where blocks take longer, since a CPU decodes them or they must be uploaded first, more are
-/// worth keeping: PoCL, 80,000 and 65,536 slots, 123 and 138 ms, cold 154 and 146.
-std::uint32_t most_recycled(std::uint32_t num_slots, ocl::DeviceType type, StreamPlace stream) {
-  return num_slots / (type == ocl::DeviceType::kCpu || stream == StreamPlace::kHost ? 2 : 8);
-}
-
 /// Slots that the frame has freed of blocks that it had asked for itself.
 std::uint64_t recycled_blocks(const FrameStats &stats) {
   std::uint64_t sum = stats.normals.recycled_blocks + stats.ambient.recycled_blocks;
@@ -88,11 +72,7 @@ FrameStats DeviceRenderer::render(const FrameRequest &request) {
   for (std::uint32_t round = 0; round < request.ambient_rays; ++round) cast_round(round, frame);
   FrameStats &stats = frame.stats;
   if (request.ambient_rays != 0 && !stats.cancelled) (*ambient_)(rays_, request.ambient_rays);
-  const std::uint64_t recycled = recycled_blocks(stats);
-  if (!stats.cancelled &&
-      recycled > most_recycled(blocks_.cache.num_slots, device_.info().type, options_.stream))
-    blocks_.clear();
-  plan_growth(recycled);
+  blocks_.close(recycled_blocks(stats), stats.cancelled);
   rays_.frame = blocks_.levels[0].frame;  // for shading
   const Uploads after = blocks_.uploads();
   stats.uploaded_blocks = after.blocks - before.blocks;
@@ -151,28 +131,27 @@ DeviceRenderer::DeviceRenderer(ocl::Device &device, const CompressedVolume &volu
       setup_begin_(std::chrono::steady_clock::now()),
       compile_ms_before_(device.compile_ms()),
       options_(checked(options, volume, device)),
-      plan_(make_plan(device, volume, options_)),
-      blocks_(device, volume, options_, plan_),
-      rays_(device, plan_.limits.rays),
+      blocks_(device, volume, options_, make_plan(device, volume, options_)),
+      rays_(device, blocks_.plan.limits.rays),
       value_range_(volume.value_range),
       size_(options_.size),
-      camera_rays_(options_.pipeline->make_wave(blocks_, rays_, plan_.limits.wave, options_)),
+      camera_rays_(
+          options_.pipeline->make_wave(blocks_, rays_, blocks_.plan.limits.wave, options_)),
       smooth_normals_(device, rays_.num_rays, options_.group_size, blocks_.levels.size() > 1),
       normals_of_camera_(blocks_, rays_, smooth_normals_, RaySource::kCamera),
       normals_of_given_(blocks_, rays_, smooth_normals_, RaySource::kGiven),
       shade_(device, options_.size.num_rays()),
       passes_(device, rays_) {
-  if (plan_.limits.kept_rays != 0) kept_.emplace(device, plan_.limits.kept_rays);
+  const MemoryPlan &plan = blocks_.plan;
+  if (plan.limits.kept_rays != 0) kept_.emplace(device, plan.limits.kept_rays);
   if (options_.with_given_rays) {
     given_rays_.emplace(blocks_, rays_, options_.group_size, options_.solver, RaySource::kGiven);
     ambient_.emplace(device, rays_.num_rays, blocks_.levels.size() > 1, is_brick());
     ambient_round_.emplace(blocks_, rays_, *ambient_, *given_rays_);
   }
-  options_.cache_slots = wanted_slots_ = plan_.cache_slots;
-  is_small_cache_ = plan_.cache_slots < kSmallCache && !plan_.can_grow() &&
-                    plan_.cache_slots < plan_.limits.cache.num_blocks;
-  options_.stream = plan_.stream;
-  options_.window_blocks = plan_.window_blocks;
+  options_.cache_slots = plan.cache_slots;
+  options_.stream = plan.stream;
+  options_.window_blocks = plan.window_blocks;
   compile_kernels();
   device.timer().collect();  // what was launched so far belongs to no frame; waits
   device.finish();
@@ -213,36 +192,6 @@ void DeviceRenderer::compile_kernels() {
   rays.reset_counts();
 }
 
-/// After a frame that has freed so many slots of its own blocks.
-void DeviceRenderer::plan_growth(std::uint64_t recycled) {
-  wanted_slots_ = grown_cache_slots(plan_, recycled);
-}
-
-/// Between frames: a cache of wanted_slots_, without a block. What there was is freed first, so
-/// that the plan is kept. Where the device has not so much memory after all, the cache stays as
-/// large as it was, or becomes smaller, and never grows again; pictures do not depend on it.
-void DeviceRenderer::grow_cache() {
-  if (wanted_slots_ == plan_.cache_slots) return;
-  const std::uint32_t before = plan_.cache_slots;
-  for (std::uint32_t slots = wanted_slots_;;) {
-    try {
-      MemoryPlan plan = resized(plan_, slots);
-      blocks_.resize(plan.limits.cache, rays_);
-      camera_rays_->resize_cache(slots);
-      plan_ = std::move(plan);
-      break;
-    } catch (const Error &) {
-      if (slots == kMinCacheSlots) throw;
-      slots = slots > before ? before : std::max(slots / 2, kMinCacheSlots);
-    }
-  }
-  if (plan_.cache_slots != wanted_slots_) {
-    plan_.most_slots = plan_.cache_slots;
-    is_small_cache_ |= plan_.cache_slots < std::min(before, kSmallCache);
-  }
-  options_.cache_slots = wanted_slots_ = plan_.cache_slots;
-}
-
 Abilities DeviceRenderer::abilities_of(const RendererOptions &options) {
   Abilities abilities;
   abilities.largest = options.size;
@@ -274,13 +223,12 @@ void DeviceRenderer::begin_frame(const FrameRequest &request) {
   open_frame(std::move(frames), values, request.bound, RaySource::kCamera);
 }
 
-/// Opens a frame with a cache of the slots that are wanted.
 void DeviceRenderer::open_frame(std::vector<FrameParams> frames,
                                 const std::vector<DecodedValues> &values, FieldBound bound,
                                 RaySource source) {
   passes_.drain();  // what the frame before had enqueued beyond its last pass
-  grow_cache();
   blocks_.open(rays_, std::move(frames), values, bound, source);
+  options_.cache_slots = blocks_.plan.cache_slots;
 }
 
 PassStats DeviceRenderer::stats_of(const PassCounts &counts) {
@@ -289,14 +237,7 @@ PassStats DeviceRenderer::stats_of(const PassCounts &counts) {
   stats.counts = counts;
   stats.counts.window_count = rays_in_window(counts.window_count, counts.active_count);
   camera_rays_->describe(stats);
-  // A launch that is not needed costs more than a pass that finds slots missing now and then. The
-  // counts are a pass old: its requests have taken slots since, and the pass after it may have
-  // asked for as many.
-  const std::uint64_t spoken_for = 2 * std::uint64_t{counts.requested_count};
-  const std::uint32_t num_slots = blocks_.cache.num_slots;
-  blocks_.slots_are_scarce =
-      is_small_cache_ ||
-      counts.free_count < std::max<std::uint64_t>(num_slots / kScarcePart, spoken_for);
+  blocks_.note(counts);
   stats.completed_percent = 100.0 * (rays - counts.next_active_count) / rays;
   stats.utilization_percent = 100.0 * counts.granted_count / rays;
   stats.stage_ms = device_.timer().collect();
@@ -360,7 +301,7 @@ std::vector<HitRecord> DeviceRenderer::cast_rays(std::span<const WorldRay> world
     Frame frame{never_stops, 1};
     run(*given_rays_, frame);
     if (normals == Normals::kSmooth) run(normals_of_given_, frame);
-    plan_growth(recycled_blocks(frame.stats));
+    blocks_.close(recycled_blocks(frame.stats), true);
     part.resize(given.size());
     wavefront.given_hits.read(part);
     for (std::size_t i = 0; i < of_part.size(); ++i) part[i].t *= of_part[i].t_scale;
@@ -478,7 +419,7 @@ std::vector<std::uint64_t> DeviceRenderer::blocked_rays(std::uint32_t round,
     const bool meets = met[ray].t != std::numeric_limits<float>::infinity();
     blocked[ray / 64] |= std::uint64_t{meets} << ray % 64;
   }
-  wanted_slots_ = std::max(wanted_slots_, grown_cache_slots(plan_, passes.recycled_blocks));
+  blocks_.close(passes.recycled_blocks, true);
   stats += passes;
   return blocked;
 }

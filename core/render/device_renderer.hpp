@@ -112,9 +112,9 @@ class DeviceRenderer : public Renderer {
   void clear_cache() override;
 
   ImageSize size() const override { return size_; }
-  std::uint64_t memory_bytes() const override { return plan_.total(); }
-  const RendererOptions &options() const { return options_; }  ///< with the defaults filled in
-  const MemoryPlan &memory_plan() const { return plan_; }      ///< every buffer that there is
+  std::uint64_t memory_bytes() const override { return blocks_.plan.total(); }
+  const RendererOptions &options() const { return options_; }     ///< with the defaults filled in
+  const MemoryPlan &memory_plan() const { return blocks_.plan; }  ///< every buffer that there is
   /// The finest level's.
   const Macrocells &macrocells() const { return blocks_.levels[0].macrocells; }
   /// Upload and macrocell ranges, without Device::compile_ms().
@@ -142,8 +142,6 @@ class DeviceRenderer : public Renderer {
   std::vector<DecodedValues> decoded_values(const FrameRequest &request) const;
   PassStats stats_of(const PassCounts &counts);
   void cast_round(std::uint32_t round, Frame &frame);
-  void plan_growth(std::uint64_t recycled);
-  void grow_cache();
   bool in_step(const OnPass &on_pass) const {
     return on_pass || device_.timer().source() != ocl::TimerSource::kOff;
   }
@@ -152,9 +150,6 @@ class DeviceRenderer : public Renderer {
   std::chrono::steady_clock::time_point setup_begin_;
   double compile_ms_before_;
   RendererOptions options_;
-  MemoryPlan plan_;
-  std::uint32_t wanted_slots_ = 0;  ///< of the cache from the next frame on
-  bool is_small_cache_ = false;     ///< slots may run out within one pass
   BlockStore blocks_;
   Wavefront rays_;
   std::array<float, 2> value_range_;  ///< of the volume before compression

@@ -21,13 +21,13 @@ RaysWave::RaysWave(BlockStore &blocks, Wavefront &rays, std::uint32_t group_size
   }
 }
 
-void RaysWave::begin() {
+void RaysWave::start(bool begins_frame) {
   const auto stage = blocks_.device.timer().stage("start_rays");
   if (blocks_.has_requests()) rays_.forget_rays();
   if (in_packets()) {
     march_packets_->begin_frame();
   } else {
-    start_rays_(macrocells(), rays_);
+    start_rays_(macrocells(), rays_, begins_frame);
   }
 }
 
@@ -66,7 +66,7 @@ void AmbientRound::begin() {
     const auto stage = blocks_.device.timer().stage("ambient");
     ambient_(rays_, round_);
   }
-  given_.begin();
+  given_.go_on();
 }
 
 namespace {

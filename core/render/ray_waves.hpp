@@ -31,7 +31,10 @@ class RaysWave : public Wave {
            RaySource source, RayPackets packets = RayPackets::kOff,
            DecodeOnDemand on_demand = DecodeOnDemand::kOff);
 
-  void begin() override;
+  void begin() override { start(true); }
+  /// begin(), if given rays belong to the frame at work: blocks that it has used stay in the cache
+  /// as long as others can go.
+  void go_on() { start(false); }
   void enqueue_pass() override;
   /// Rays look ahead at the end of a pass: those that are left.
   void describe(PassStats &stats) const override {
@@ -39,6 +42,7 @@ class RaysWave : public Wave {
   }
 
  private:
+  void start(bool begins_frame);
   const Macrocells &macrocells() const { return blocks_.levels[0].macrocells; }
   /// Whether the frame at work goes in packets.
   bool in_packets() const { return march_packets_ && !draws_levels(rays_); }

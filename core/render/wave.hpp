@@ -32,8 +32,6 @@ class Wave {
   virtual LaterPasses *sum_in(FrameStats & /*stats*/) const { return nullptr; }
   /// Adds to a pass's statistics what depends on how a wave of camera rays is traced.
   virtual void describe(PassStats & /*stats*/) const {}
-  /// For a cache of so many slots from now on: as BlockCache::resize(). Between frames.
-  virtual void resize_cache(std::uint32_t /*num_slots*/) {}
 };
 
 }  // namespace isowave::core

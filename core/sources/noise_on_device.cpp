@@ -62,7 +62,7 @@ NoiseOnDevice::NoiseOnDevice(ocl::Device &device, const NoiseField &field, const
       dims_(dims),
       type_(type),
       octaves_(device_, "octaves", std::span<const NoiseOctave>(field.octaves)),
-      kernel_(device_, "noise_field", "noise_field", defines_for(type)) {}
+      kernel_(device_, defines_for(type)) {}
 
 void NoiseOnDevice::evaluate(std::uint32_t z_begin, std::uint32_t num_layers,
                              std::span<std::byte> voxels) {

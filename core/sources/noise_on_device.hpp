@@ -6,9 +6,9 @@
 #include <optional>
 #include <span>
 
-#include "core/ocl/kernel.hpp"
 #include "core/sources/generate.hpp"
 #include "core/sources/noise_field.hpp"
+#include "kernels/noise_field.hpp"
 
 namespace isowave::core {
 
@@ -34,8 +34,7 @@ class NoiseOnDevice : public NoiseVoxels {
   VoxelType type_;
   ocl::Buffer<NoiseOctave> octaves_;
   std::optional<ocl::Buffer<std::byte>> voxels_{};  ///< as many as were asked for at once
-  ocl::Kernel<ocl::In<NoiseOctave>, NoiseShape, uint, uint, uint, uint, ocl::Out<std::byte>>
-      kernel_;
+  ocl::Kernel<kernels::noise_field> kernel_;
 };
 
 /// GenerateOptions::noise by a device, if it suits: opened once more for each volume, since layers

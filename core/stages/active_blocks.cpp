@@ -16,8 +16,8 @@ ActiveBlocks::ActiveBlocks(ocl::Device &device, std::uint64_t num_macrocells)
       masks_(device, sizes(num_macrocells)["listed masks"]),
       offsets_(device, sizes(num_macrocells)["listed offsets"]),
       sum_(device, num_macrocells, ocl::kGroupSize),
-      masks_kernel_(device, "active_blocks", "active_masks"),
-      list_kernel_(device, "active_blocks", "active_list") {}
+      masks_kernel_(device),
+      list_kernel_(device) {}
 
 std::uint32_t ActiveBlocks::count(const FrameParams &frame, const ocl::Buffer<uint> &masks) {
   masks_kernel_(range_, frame, num_macrocells_, masks, masks_, offsets_);

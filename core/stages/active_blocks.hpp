@@ -2,8 +2,8 @@
 // Masks of active blocks -> a list of the blocks that an isosurface is extracted from
 // (kernels_cl/active_blocks.cl).
 
-#include "core/ocl/kernel.hpp"
 #include "core/stages/prefix_sum.hpp"
+#include "kernels/active_blocks.hpp"
 #include "kernels_cl/portable/shared_types.h"
 
 namespace isowave::core {
@@ -37,8 +37,8 @@ class ActiveBlocks {
   ocl::Range range_;
   ocl::Buffer<uint> masks_, offsets_;
   PrefixSum sum_;
-  ocl::Kernel<FrameParams, uint, ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>> masks_kernel_;
-  ocl::Kernel<FrameParams, uint, ocl::In<uint>, ocl::In<uint>, ocl::Out<uint>> list_kernel_;
+  ocl::Kernel<kernels::active_masks> masks_kernel_;
+  ocl::Kernel<kernels::active_list> list_kernel_;
 };
 
 }  // namespace isowave::core

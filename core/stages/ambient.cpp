@@ -20,7 +20,7 @@ ocl::BufferSizes Ambient::sizes() {
 Ambient::Ambient(ocl::Device &device, std::uint64_t num_pixels, bool levels, bool placed)
     : range_(ocl::Range::strided(num_pixels, ocl::kGroupSize, device)),
       directions_(device, sizes()["ambient directions"]),
-      kernel_(device, "ambient", defines_of(placed), levels) {}
+      kernel_(device, defines_of(placed), levels) {}
 
 void Ambient::begin(const VolumeInfo &info, std::uint32_t num_rays) {
   check_ambient_rays(num_rays);

@@ -5,6 +5,7 @@
 
 #include "core/frame/ambient_rays.hpp"
 #include "core/stages/levelled_kernel.hpp"
+#include "kernels/ambient.hpp"
 
 namespace isowave::core {
 
@@ -33,10 +34,7 @@ class Ambient {
   ocl::Buffer<AmbientDirection> directions_;
   std::uint32_t num_rays_ = 0;
   AmbientParams params_{};
-  LevelledKernel<FrameParams, ocl::In<FrameParams>, uint, AmbientParams, ocl::In<AmbientDirection>,
-                 uint, uint, ocl::In<HitRecord>, ocl::In<HitRecord>, ocl::Out<GivenRay>,
-                 ocl::Out<uchar>>
-      kernel_;
+  LevelledKernel<kernels::ambient> kernel_;
 };
 
 }  // namespace isowave::core

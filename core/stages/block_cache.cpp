@@ -82,15 +82,15 @@ BlockCache::BlockCache(ocl::Device &device, const Limits &limits, const ocl::Buf
       slot_changing_(device, sizes["cells of cached blocks"]),
       rank_histogram_(device, sizes["eviction ranks"]),
       touched_(device, sizes["touched blocks"]),
-      request_(device, "block_cache", "cache_request", defines),
-      rank_(device, "block_cache", "cache_rank", defines),
-      select_(device, "block_cache", "cache_select", defines),
-      evict_(device, "block_cache", "cache_evict", defines),
-      rebuild_(device, "block_cache", "cache_rebuild", defines),
-      classify_(device, "block_cache", "cache_classify", defines),
-      assign_(device, "block_cache", "cache_assign", defines),
-      count_touched_(device, "block_cache", "cache_touched", defines),
-      clear_(device, "block_cache", "cache_clear", defines) {
+      request_(device, defines),
+      rank_(device, defines),
+      select_(device, defines),
+      evict_(device, defines),
+      rebuild_(device, defines),
+      classify_(device, defines),
+      assign_(device, defines),
+      count_touched_(device, defines),
+      clear_(device, defines) {
   clear();
 }
 

@@ -2,8 +2,8 @@
 // A fixed number of slots for decoded blocks, least recently used ones replaced (Sec. 3.4, 3.5).
 // In: the blocks that a pass's pairs ask for; out: the list of blocks to decode and their slots.
 
-#include "core/ocl/kernel.hpp"
 #include "core/stages/wavefront.hpp"
+#include "kernels/block_cache.hpp"
 #include "kernels_cl/portable/block_table.h"
 
 namespace isowave::core {
@@ -110,36 +110,15 @@ struct BlockCache {
       slot_changing_;  ///< [num_slots] BlockEntry::changing while the table is rebuilt
   ocl::Buffer<uint> rank_histogram_;
   ocl::Buffer<uint> touched_;  ///< [1]
-  ocl::Kernel<FrameParams, ocl::Out<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>,
-              ocl::In<BlockEntry>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>, uint,
-              ocl::Out<CacheState>>
-      request_;
-  ocl::Kernel<FrameParams, ocl::In<PassCounts>, uint, uint, ocl::In<CacheState>,
-              ocl::In<BlockEntry>, ocl::In<uint>, ocl::In<uint>, ocl::Out<uchar>, ocl::Out<ulong>,
-              ocl::Out<uint>>
-      rank_;
-  ocl::Kernel<FrameParams, ocl::In<PassCounts>, uint, ocl::In<BlockEntry>, ocl::Out<uint>,
-              ocl::Out<uint>, ocl::Out<uint>, uint, ocl::Out<uint>, ocl::Out<CacheState>>
-      select_;
-  ocl::Kernel<FrameParams, ocl::In<PassCounts>, uint, ocl::Out<uint>, ocl::In<uint>, ocl::In<uchar>,
-              ocl::Out<BlockEntry>, ocl::Out<CacheState>, ocl::Out<uint>>
-      evict_;
-  ocl::Kernel<FrameParams, ocl::In<PassCounts>, uint, ocl::In<uint>, ocl::In<ulong>,
-              ocl::In<CacheState>, ocl::Out<BlockEntry>>
-      rebuild_;
-  ocl::Kernel<FrameParams, uint, ocl::In<uint>, ocl::In<float>, ocl::Out<ulong>,
-              ocl::Out<BlockEntry>>
-      classify_;
-  ocl::Kernel<FrameParams, ocl::In<PassCounts>, ocl::Out<PassCounts>, ocl::In<uint>, uint,
-              ocl::In<uint>, ocl::Out<BlockEntry>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>,
-              ocl::Out<uint>, ocl::Out<CacheState>>
-      assign_;
-  ocl::Kernel<FrameParams, ocl::In<PassCounts>, uint, uint, ocl::In<BlockEntry>, ocl::In<uint>,
-              ocl::In<uint>, ocl::Out<uint>>
-      count_touched_;
-  ocl::Kernel<uint, uint, ocl::Out<BlockEntry>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>,
-              ocl::Out<CacheState>>
-      clear_;
+  ocl::Kernel<kernels::cache_request> request_;
+  ocl::Kernel<kernels::cache_rank> rank_;
+  ocl::Kernel<kernels::cache_select> select_;
+  ocl::Kernel<kernels::cache_evict> evict_;
+  ocl::Kernel<kernels::cache_rebuild> rebuild_;
+  ocl::Kernel<kernels::cache_classify> classify_;
+  ocl::Kernel<kernels::cache_assign> assign_;
+  ocl::Kernel<kernels::cache_touched> count_touched_;
+  ocl::Kernel<kernels::cache_clear> clear_;
 };
 
 }  // namespace isowave::core

@@ -7,9 +7,7 @@ ocl::BufferSizes KeptPicture::sizes(std::uint64_t num_rays) {
 }
 
 KeptPicture::KeptPicture(ocl::Device &device, std::uint64_t num_rays)
-    : device_(device),
-      hits_(device, sizes(num_rays)["kept hits"]),
-      show_(device, "kept_picture", "show_kept") {}
+    : device_(device), hits_(device, sizes(num_rays)["kept hits"]), show_(device) {}
 
 void KeptPicture::compile(Wavefront &rays) {
   for (const std::uint64_t num_rays :

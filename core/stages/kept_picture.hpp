@@ -4,9 +4,9 @@
 
 #include <cstdint>
 
-#include "core/ocl/kernel.hpp"
 #include "core/stages/wavefront.hpp"
 #include "core/view/frame.hpp"
+#include "kernels/kept_picture.hpp"
 
 namespace isowave::core {
 
@@ -33,7 +33,7 @@ class KeptPicture {
   ocl::Device &device_;
   ImageSize size_{0, 0};
   ocl::Buffer<HitRecord> hits_;
-  ocl::Kernel<FrameParams, uint, uint, ocl::In<HitRecord>, uint, ocl::Out<HitRecord>> show_;
+  ocl::Kernel<kernels::show_kept> show_;
 };
 
 }  // namespace isowave::core

@@ -13,23 +13,23 @@ inline bool draws_levels(const Wavefront &rays) {
   return rays.num_level_frames > 1 || rays.frame.place.begin_z != 0;
 }
 
-template <class... Params>
+template <class Signature>
 class LevelledKernel {
  public:
-  /// stem: of the file, and the kernel's name. levels: frames may have several levels of detail.
-  LevelledKernel(ocl::Device &device, const char *stem, const ocl::Defines &defines, bool levels)
-      : finest_(device, stem, stem, defines) {
-    if (levels) levels_.emplace(device, stem, stem, with_levels(defines, true));
+  /// levels: frames may have several levels of detail.
+  LevelledKernel(ocl::Device &device, const ocl::Defines &defines, bool levels)
+      : finest_(device, defines) {
+    if (levels) levels_.emplace(device, with_levels(defines, true));
   }
 
   /// The version for the frame at work.
-  ocl::Kernel<Params...> &of(const Wavefront &rays) {
+  ocl::Kernel<Signature> &of(const Wavefront &rays) {
     return levels_ && draws_levels(rays) ? *levels_ : finest_;
   }
 
  private:
-  ocl::Kernel<Params...> finest_;  ///< a tenth faster
-  std::optional<ocl::Kernel<Params...>> levels_;
+  ocl::Kernel<Signature> finest_;  ///< a tenth faster
+  std::optional<ocl::Kernel<Signature>> levels_;
 };
 
 }  // namespace isowave::core

@@ -23,7 +23,7 @@ constexpr std::array kNoExtremes = {std::numeric_limits<int>::max(),
 }  // namespace
 
 ocl::BufferSizes MacrocellBuffers::sizes(const Limits &limits) {
-  ocl::BufferSizes sizes{ocl::buffer_size<cl_ushort>("block ranges", limits.num_blocks)};
+  ocl::BufferSizes sizes{ocl::buffer_size<ushort>("block ranges", limits.num_blocks)};
   for (std::size_t i = 0; i < limits.num_selections; ++i)
     sizes.add({ocl::buffer_size<uint>("macrocell masks", 2 * limits.num_macrocells)});
   if (limits.no_data_words != 0)
@@ -39,7 +39,7 @@ MacrocellBuffers::MacrocellBuffers(ocl::Device &device, const Limits &limits)
 }
 
 ocl::BufferSizes Macrocells::sizes(std::uint64_t num_macrocells, std::size_t num_selections) {
-  ocl::BufferSizes sizes{ocl::buffer_size<cl_ushort>("macrocell ranges", num_macrocells),
+  ocl::BufferSizes sizes{ocl::buffer_size<ushort>("macrocell ranges", num_macrocells),
                          ocl::buffer_size<uint>("active limits", ISO_BOUND_CODES)};
   for (std::size_t i = 0; i < num_selections; ++i)
     sizes.add({ocl::buffer_size<int>("active box", 6)});
@@ -58,7 +58,7 @@ Macrocells::Macrocells(ocl::Device &device, const FrameParams &frame, const Devi
       coarse_ranges_(device, own_sizes()["macrocell ranges"]),
       limits_(device, own_sizes()["active limits"]),
       thresholds_(std::move(thresholds)),
-      masks_kernel_(device, "macrocells", "macrocell_masks", stream.defines()) {
+      masks_kernel_(device, stream.defines()) {
   for (const ocl::BufferSize &size : own_sizes().named("active box"))
     selections_.push_back({.box = ocl::Buffer<int>(device, size)});
   build(device, frame, stream, extremes);
@@ -70,7 +70,7 @@ void Macrocells::compile(ocl::Device &device, const DeviceStream &stream, BuildK
   const auto compiling = device.compiling();
   const FrameParams no_blocks{};
   const ocl::Range range{1, ocl::kGroupSize};
-  ocl::Buffer<ValueRange> partials(device, sampling_sizes(1)["range samples"]);
+  ocl::Buffer<VoxelRange> partials(device, sampling_sizes(1)["range samples"]);
   const ocl::Buffer<float> thresholds(device, layer_sizes(1)["range thresholds"]);
   // limits_ stands in for words that are not read.
   kernels.partials(range, no_blocks, limits_, limits_, limits_, limits_, limits_, stream.layout, 0,
@@ -89,10 +89,7 @@ void Macrocells::compile(ocl::Device &device, const DeviceStream &stream, BuildK
 void Macrocells::build(ocl::Device &device, const FrameParams &frame, const DeviceStream &stream,
                        std::array<float, 2> *extremes) {
   const auto stage = device.timer().stage("macrocells");
-  BuildKernels kernels{{device, "macrocells", "macrocell_partials", stream.defines()},
-                       {device, "macrocells", "macrocell_ranges", stream.defines()},
-                       {device, "macrocells", "macrocell_coarse_ranges", stream.defines()},
-                       {device, "macrocells", "macrocell_extremes", stream.defines()}};
+  BuildKernels kernels(device, stream.defines());
   compile(device, stream, kernels, extremes != nullptr);
   Partials decode{device, frame, stream, kernels.partials};
   if (thresholds_.empty()) {
@@ -104,8 +101,8 @@ void Macrocells::build(ocl::Device &device, const FrameParams &frame, const Devi
   const ocl::BufferSizes scratch = layer_sizes(layer_blocks);
   ocl::Buffer<float> thresholds(device, scratch["range thresholds"]);
   thresholds.write(thresholds_);
-  ocl::Buffer<ValueRange> below(device, scratch["range partials, layer below"]);
-  ocl::Buffer<ValueRange> above(device, scratch["range partials, layer above"]);
+  ocl::Buffer<VoxelRange> below(device, scratch["range partials, layer below"]);
+  ocl::Buffer<VoxelRange> above(device, scratch["range partials, layer above"]);
   const ocl::Range layer_range = ocl::Range::strided(layer_blocks, ocl::kGroupSize, device);
   constexpr std::uint32_t kBlocksPerItem = 64;
   const ocl::Range few_items = ocl::Range::strided(
@@ -137,19 +134,19 @@ std::uint64_t Macrocells::setup_scratch_bytes(const glm::uvec3 &num_blocks) {
 }
 
 ocl::BufferSizes Macrocells::sampling_sizes(std::uint64_t num_blocks) {
-  return {ocl::buffer_size<ValueRange>("range samples",
+  return {ocl::buffer_size<VoxelRange>("range samples",
                                        8 * std::uint64_t{range_sample(num_blocks).count})};
 }
 
 ocl::BufferSizes Macrocells::layer_sizes(std::uint64_t layer_blocks) {
   return {ocl::buffer_size<float>("range thresholds", kNumThresholds),
-          ocl::buffer_size<ValueRange>("range partials, layer below", 8 * layer_blocks),
-          ocl::buffer_size<ValueRange>("range partials, layer above", 8 * layer_blocks),
+          ocl::buffer_size<VoxelRange>("range partials, layer below", 8 * layer_blocks),
+          ocl::buffer_size<VoxelRange>("range partials, layer above", 8 * layer_blocks),
           ocl::buffer_size<int>("extremes", 2)};
 }
 
 void Macrocells::Partials::operator()(std::uint32_t first, std::uint32_t stride,
-                                      std::uint32_t count, ocl::Buffer<ValueRange> &partials) {
+                                      std::uint32_t count, ocl::Buffer<VoxelRange> &partials) {
   if (!stream.window) {
     kernel(ocl::Range::strided(count, ocl::kGroupSize, device), frame, stream.part(0),
            stream.part(1), stream.part(2), stream.part(3), stream.index(), stream.layout, first,
@@ -171,9 +168,9 @@ void Macrocells::Partials::operator()(std::uint32_t first, std::uint32_t stride,
 std::vector<float> Macrocells::sample_thresholds(ocl::Device &device, std::uint32_t num_blocks,
                                                  Partials &decode) {
   const RangeSample sample = range_sample(num_blocks);
-  ocl::Buffer<ValueRange> partials(device, sampling_sizes(num_blocks)["range samples"]);
+  ocl::Buffer<VoxelRange> partials(device, sampling_sizes(num_blocks)["range samples"]);
   decode(0, sample.stride, sample.count, partials);
-  const std::vector<ValueRange> samples = partials.read();
+  const std::vector<VoxelRange> samples = partials.read();
   std::vector<float> values;
   values.reserve(2 * std::size_t{sample.count});
   for (std::size_t i = 0; i < samples.size(); i += 8) {  // entry 0 of 8: the whole block

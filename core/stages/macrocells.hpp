@@ -9,10 +9,10 @@
 #include <optional>
 #include <vector>
 
-#include "core/ocl/kernel.hpp"
 #include "core/stages/device_counts.hpp"
 #include "core/stream/device_stream.hpp"
 #include "core/volume/block_box.hpp"
+#include "kernels/macrocells.hpp"
 
 namespace isowave::core {
 
@@ -31,7 +31,7 @@ struct MacrocellBuffers {
 
   MacrocellBuffers(ocl::Device &device, const Limits &limits);
 
-  ocl::Buffer<cl_ushort> ranges;
+  ocl::Buffer<ushort> ranges;
   std::vector<ocl::Buffer<uint>> masks;        ///< [selections]
   std::optional<ocl::Buffer<uint>> no_data{};  ///< of several levels
   std::size_t selection = 0;                   ///< the one in use, at all levels
@@ -87,7 +87,7 @@ class Macrocells {
   const ocl::Buffer<uint> &masks() const { return buffers_->masks[buffers_->selection]; }
   /// [blocks]: low in bits 0..7, high in bits 8..15, indices into thresholds(); low > high: owns no
   /// dual cell.
-  const ocl::Buffer<cl_ushort> &ranges() const { return buffers_->ranges; }
+  const ocl::Buffer<ushort> &ranges() const { return buffers_->ranges; }
   /// The table for all levels, if they are several (MacrocellBuffers).
   NoDataOnDevice no_data() const {
     if (!buffers_->no_data) return {};
@@ -97,21 +97,15 @@ class Macrocells {
   const std::vector<float> &thresholds() const { return thresholds_; }
 
  private:
-  struct ValueRange {
-    float min, max;
-  };
-  using PartialsKernel =
-      ocl::Kernel<FrameParams, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>,
-                  ocl::In<uint>, StreamLayout, uint, uint, uint, uint, ocl::Out<ValueRange>>;
   /// Decodes blocks sampled_block(first + i * stride, stride), i in [0, count): partials [8 *
   /// count].
   struct Partials {
     void operator()(std::uint32_t first, std::uint32_t stride, std::uint32_t count,
-                    ocl::Buffer<ValueRange> &partials);
+                    ocl::Buffer<VoxelRange> &partials);
     ocl::Device &device;
     const FrameParams &frame;
     const DeviceStream &stream;
-    PartialsKernel &kernel;
+    ocl::Kernel<kernels::macrocell_partials> &kernel;
   };
 
   /// What masks are made of, and what belongs to them.
@@ -132,12 +126,15 @@ class Macrocells {
   static ocl::BufferSizes layer_sizes(std::uint64_t layer_blocks);
 
   struct BuildKernels {
-    PartialsKernel partials;
-    ocl::Kernel<FrameParams, uint, ocl::In<ValueRange>, ocl::In<ValueRange>, ocl::In<float>,
-                ocl::Out<cl_ushort>>
-        ranges;
-    ocl::Kernel<FrameParams, uint, ocl::In<cl_ushort>, ocl::Out<cl_ushort>> coarse_ranges;
-    ocl::Kernel<uint, ocl::In<ValueRange>, ocl::Out<int>> extremes;
+    BuildKernels(ocl::Device &device, const ocl::Defines &defines)
+        : partials(device, defines),
+          ranges(device, defines),
+          coarse_ranges(device, defines),
+          extremes(device, defines) {}
+    ocl::Kernel<kernels::macrocell_partials> partials;
+    ocl::Kernel<kernels::macrocell_ranges> ranges;
+    ocl::Kernel<kernels::macrocell_coarse_ranges> coarse_ranges;
+    ocl::Kernel<kernels::macrocell_extremes> extremes;
   };
   void compile(ocl::Device &device, const DeviceStream &stream, BuildKernels &kernels,
                bool with_extremes);
@@ -149,13 +146,11 @@ class Macrocells {
   std::uint32_t num_coarse_;
   ocl::Range coarse_range_;
   std::shared_ptr<MacrocellBuffers> buffers_;
-  ocl::Buffer<cl_ushort> coarse_ranges_;
+  ocl::Buffer<ushort> coarse_ranges_;
   ocl::Buffer<uint> limits_;
   std::vector<Selection> selections_;
   std::vector<float> thresholds_;
-  ocl::Kernel<FrameParams, uint, ocl::In<cl_ushort>, ocl::In<cl_ushort>, ocl::In<uint>, uint,
-              ocl::In<uint>, uint, ocl::Out<uint>, ocl::Out<int>>
-      masks_kernel_;
+  ocl::Kernel<kernels::macrocell_masks> masks_kernel_;
 };
 
 }  // namespace isowave::core

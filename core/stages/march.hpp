@@ -6,6 +6,7 @@
 #include "core/stages/block_cache.hpp"
 #include "core/stages/levelled_kernel.hpp"
 #include "core/stages/macrocells.hpp"
+#include "kernels/march.hpp"
 
 namespace isowave::core {
 
@@ -26,12 +27,7 @@ class March {
  private:
   RaySource source_;
   ocl::Range range_;
-  LevelledKernel<FrameParams, ocl::In<FrameParams>, uint, uint, ocl::In<GivenRay>, ocl::In<uint>,
-                 ocl::In<cl_ushort>, ocl::In<uint>, uint, ocl::Out<BlockEntry>, ocl::In<ulong>,
-                 ocl::In<float>, ocl::In<PassCounts>, ocl::Out<PassCounts>, ocl::Out<PassCounts>,
-                 ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<HitRecord>, ocl::Out<uint>,
-                 ocl::Out<CacheState>>
-      kernel_;
+  LevelledKernel<kernels::march> kernel_;
 };
 
 }  // namespace isowave::core

@@ -42,8 +42,8 @@ MarchPackets::MarchPackets(ocl::Device &device, std::uint64_t num_pixels, Solver
                            const DeviceStream *on_demand)
     : on_demand_(on_demand != nullptr),
       range_(range_of(device, num_pixels, on_demand_)),
-      open_(device, "march_packets", "open_packets", packet_defines(solver, on_demand)),
-      march_(device, "march_packets", "march_packets", packet_defines(solver, on_demand)) {}
+      open_(device, packet_defines(solver, on_demand)),
+      march_(device, packet_defines(solver, on_demand)) {}
 
 void MarchPackets::operator()(const Macrocells &macrocells, const DeviceStream &stream,
                               BlockCache &cache, Wavefront &rays) {

@@ -7,6 +7,7 @@
 #include "core/stages/macrocells.hpp"
 #include "core/stages/wavefront.hpp"
 #include "core/stream/device_stream.hpp"
+#include "kernels/march_packets.hpp"
 
 namespace isowave::core {
 
@@ -49,15 +50,8 @@ class MarchPackets {
   bool on_demand_;
   ocl::Range range_;
   bool begins_ = false;  ///< the next pass is the first of its frame
-  ocl::Kernel<FrameParams, uint, ocl::In<PassCounts>, ocl::Out<PassCounts>, ocl::Out<PassCounts>,
-              ocl::Out<CacheState>>
-      open_;
-  ocl::Kernel<FrameParams, uint, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>,
-              ocl::In<uint>, StreamLayout, ocl::In<uint>, ocl::Out<BlockEntry>, ocl::Out<ulong>,
-              ocl::Out<float>, ocl::In<PassCounts>, ocl::Out<PassCounts>, ocl::In<uint>,
-              ocl::Out<uint>, ocl::Out<uint>, ocl::Out<HitRecord>, ocl::Out<uint>, ocl::Out<uint>,
-              ocl::Out<uint>, ocl::In<uint>, ocl::Out<CacheState>>
-      march_;
+  ocl::Kernel<kernels::open_packets> open_;
+  ocl::Kernel<kernels::march_packets> march_;
 };
 
 }  // namespace isowave::core

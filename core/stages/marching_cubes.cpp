@@ -41,8 +41,8 @@ MarchingCubes::MarchingCubes(ocl::Device &device, Gradients gradients)
     : device_(device),
       with_gradients_(gradients == Gradients::kSmooth ? 1 : 0),
       cell_triangles_(device, sizes()["cell triangles"]),
-      count_(device, "marching_cubes", "marching_cubes_count", group_defines(ISO_BLOCK_VOXELS)),
-      write_(device, "marching_cubes", "marching_cubes_write", group_defines(ISO_BLOCK_VOXELS)) {
+      count_(device, group_defines(ISO_BLOCK_VOXELS)),
+      write_(device, group_defines(ISO_BLOCK_VOXELS)) {
   cell_triangles_.write(cell_triangles());
 }
 

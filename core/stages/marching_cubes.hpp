@@ -2,11 +2,11 @@
 // Listed blocks whose values are cached -> vertices and triangles of their isosurface
 // (kernels_cl/marching_cubes.cl).
 
-#include "core/ocl/kernel.hpp"
 #include "core/stages/active_blocks.hpp"
 #include "core/stages/block_cache.hpp"
 #include "core/stages/request_surface.hpp"
 #include "core/stream/device_stream.hpp"
+#include "kernels/marching_cubes.hpp"
 #include "kernels_cl/portable/marching_cubes.h"
 
 namespace isowave::core {
@@ -72,15 +72,8 @@ class MarchingCubes {
   ocl::Device &device_;
   uint with_gradients_;
   ocl::Buffer<uchar> cell_triangles_;
-  ocl::Kernel<FrameParams, uint, uint, ocl::In<uint>, ocl::In<BlockEntry>, ocl::In<ulong>,
-              ocl::In<uchar>, ocl::In<uint>, uint, ocl::Out<BlockEdges>, ocl::Out<uint>,
-              ocl::Out<uint>>
-      count_;
-  ocl::Kernel<FrameParams, uint, uint, uint, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>,
-              ocl::In<BlockEntry>, ocl::In<float>, ocl::In<ulong>, ocl::In<uchar>, ocl::In<uint>,
-              uint, ocl::In<BlockEdges>, ocl::In<uint>, ocl::In<uint>, ocl::Out<MeshVertex>,
-              ocl::Out<float>, ocl::Out<MeshTriangle>>
-      write_;
+  ocl::Kernel<kernels::marching_cubes_count> count_;
+  ocl::Kernel<kernels::marching_cubes_write> write_;
 };
 
 }  // namespace isowave::core

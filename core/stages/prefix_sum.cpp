@@ -16,9 +16,9 @@ PrefixSum::PrefixSum(ocl::Device &device, std::uint64_t max_count, std::uint32_t
       max_count_(max_count),
       group_size_(group_size),
       tile_sums_(device, sizes(max_count, group_size)["prefix tile sums"]),
-      tile_sums_kernel_(device, "prefix_sum", "prefix_tile_sums", group_defines(group_size)),
-      tile_offsets_kernel_(device, "prefix_sum", "prefix_tile_offsets", group_defines(group_size)),
-      tiles_kernel_(device, "prefix_sum", "prefix_tiles", group_defines(group_size)) {}
+      tile_sums_kernel_(device, group_defines(group_size)),
+      tile_offsets_kernel_(device, group_defines(group_size)),
+      tiles_kernel_(device, group_defines(group_size)) {}
 
 void PrefixSum::operator()(ocl::Buffer<uint> &values, std::uint32_t count) {
   if (count > max_count_ || count >= values.size()) {

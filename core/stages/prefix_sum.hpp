@@ -2,8 +2,8 @@
 // Exclusive prefix sum of a table that may be long and whose length the host knows. ExclusiveScan
 // (scan.hpp) is for short ones whose length lives on the device.
 
-#include "core/ocl/kernel.hpp"
 #include "core/stages/device_counts.hpp"
+#include "kernels/prefix_sum.hpp"
 
 namespace isowave::core {
 
@@ -25,9 +25,9 @@ class PrefixSum {
   std::uint64_t max_count_;
   std::uint32_t group_size_;
   ocl::Buffer<uint> tile_sums_;
-  ocl::Kernel<ocl::In<uint>, uint, ocl::Out<uint>> tile_sums_kernel_;
-  ocl::Kernel<uint, ocl::Out<uint>, ocl::Out<uint>> tile_offsets_kernel_;
-  ocl::Kernel<ocl::Out<uint>, uint, ocl::In<uint>> tiles_kernel_;
+  ocl::Kernel<kernels::prefix_tile_sums> tile_sums_kernel_;
+  ocl::Kernel<kernels::prefix_tile_offsets> tile_offsets_kernel_;
+  ocl::Kernel<kernels::prefix_tiles> tiles_kernel_;
 };
 
 }  // namespace isowave::core

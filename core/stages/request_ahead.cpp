@@ -5,7 +5,7 @@ namespace isowave::core {
 RequestAhead::RequestAhead(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_size,
                            bool levels, RaySource source)
     : range_(ocl::Range::strided(num_pixels, group_size, device)),
-      kernel_(device, "request_ahead", with_source(group_defines(group_size), source), levels) {}
+      kernel_(device, with_source(group_defines(group_size), source), levels) {}
 
 void RequestAhead::operator()(const Macrocells &macrocells, BlockCache &cache, Wavefront &rays) {
   kernel_.of(rays)(range_, rays.frame, rays.level_frames, rays.num_level_frames, rays.given,

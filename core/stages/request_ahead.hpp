@@ -5,6 +5,7 @@
 #include "core/stages/block_cache.hpp"
 #include "core/stages/levelled_kernel.hpp"
 #include "core/stages/macrocells.hpp"
+#include "kernels/request_ahead.hpp"
 
 namespace isowave::core {
 
@@ -26,10 +27,7 @@ class RequestAhead {
 
  private:
   ocl::Range range_;
-  LevelledKernel<FrameParams, ocl::In<FrameParams>, uint, ocl::In<GivenRay>, ocl::In<uint>,
-                 ocl::In<BlockEntry>, ocl::Out<PassCounts>, ocl::In<uint>, ocl::In<uint>,
-                 ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>, uint, ocl::Out<CacheState>>
-      kernel_;
+  LevelledKernel<kernels::request_ahead> kernel_;
 };
 
 }  // namespace isowave::core

@@ -7,8 +7,8 @@ namespace isowave::core {
 RequestSurface::RequestSurface(ocl::Device &device, Gradients gradients)
     : device_(device),
       with_gradients_(gradients == Gradients::kSmooth ? 1 : 0),
-      request_(device, "request_surface", "request_surface"),
-      count_(device, "request_surface", "count_needed") {}
+      request_(device),
+      count_(device) {}
 
 ocl::BufferSizes RequestSurface::count_sizes(std::uint64_t num_macrocells) {
   return {ocl::buffer_size<uint>("needed blocks", 2 * num_macrocells),

@@ -2,9 +2,9 @@
 // Listed blocks -> requests to the block cache for all that a mesh of them needs
 // (kernels_cl/request_surface.cl).
 
-#include "core/ocl/kernel.hpp"
 #include "core/stages/block_cache.hpp"
 #include "core/stages/wavefront.hpp"
+#include "kernels/request_surface.hpp"
 #include "kernels_cl/portable/marching_cubes.h"
 
 namespace isowave::core {
@@ -42,11 +42,8 @@ class RequestSurface {
  private:
   ocl::Device &device_;
   uint with_gradients_;
-  ocl::Kernel<FrameParams, uint, uint, uint, ocl::In<uint>, ocl::Out<PassCounts>,
-              ocl::In<BlockEntry>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<uint>, uint,
-              ocl::Out<CacheState>>
-      request_;
-  ocl::Kernel<FrameParams, uint, uint, ocl::In<uint>, ocl::Out<uint>, ocl::Out<uint>> count_;
+  ocl::Kernel<kernels::request_surface> request_;
+  ocl::Kernel<kernels::count_needed> count_;
 };
 
 }  // namespace isowave::core

@@ -11,7 +11,7 @@ Shade::Shade(ocl::Device &device, std::uint64_t max_pixels)
     : device_(device),
       params_(device, sizes(max_pixels)["shading"]),
       image_(device, sizes(max_pixels)["framebuffer"]),
-      kernel_(device, "shade", "shade") {}
+      kernel_(device) {}
 
 void Shade::compile(Wavefront &rays) {
   for (const std::size_t num_pixels :

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "core/frame/appearance.hpp"
-#include "core/ocl/kernel.hpp"
 #include "core/stages/wavefront.hpp"
+#include "kernels/shade.hpp"
 
 namespace isowave::core {
 
@@ -32,9 +32,7 @@ class Shade {
   ocl::Device &device_;
   ocl::Buffer<ShadeParams> params_;
   ocl::Buffer<uint> image_;
-  ocl::Kernel<FrameParams, ocl::In<ShadeParams>, uint, ocl::In<HitRecord>, ocl::In<uchar>, uint,
-              ocl::Out<uint>>
-      kernel_;
+  ocl::Kernel<kernels::shade> kernel_;
 };
 
 }  // namespace isowave::core

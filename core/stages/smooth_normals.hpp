@@ -3,6 +3,7 @@
 
 #include "core/stages/block_cache.hpp"
 #include "core/stages/levelled_kernel.hpp"
+#include "kernels/smooth_normals.hpp"
 
 namespace isowave::core {
 
@@ -29,11 +30,7 @@ class SmoothNormals {
 
  private:
   ocl::Range range_;
-  LevelledKernel<FrameParams, ocl::In<FrameParams>, uint, uint, uint, ocl::In<BlockEntry>,
-                 ocl::In<float>, ocl::In<PassCounts>, ocl::Out<PassCounts>, ocl::Out<PassCounts>,
-                 ocl::In<uint>, ocl::Out<uint>, ocl::Out<HitRecord>, ocl::Out<uint>, ocl::Out<uint>,
-                 ocl::Out<uint>, uint, ocl::Out<CacheState>>
-      kernel_;
+  LevelledKernel<kernels::smooth_normals> kernel_;
 };
 
 }  // namespace isowave::core

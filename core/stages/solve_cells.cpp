@@ -7,7 +7,7 @@
 namespace isowave::core {
 
 SolveCells::SolveCells(ocl::Device &device, Solver solver)
-    : device_(&device), kernel_(device, "solve_cells", "solve_cells", solver_defines(solver)) {}
+    : device_(&device), kernel_(device, solver_defines(solver)) {}
 
 void SolveCells::operator()(const ocl::Buffer<Cubic> &cubics, ocl::Buffer<float> &roots) {
   if (roots.size() != cubics.size())

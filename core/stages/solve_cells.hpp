@@ -3,7 +3,7 @@
 // same headers.
 
 #include "core/frame/solvers.hpp"
-#include "core/ocl/kernel.hpp"
+#include "kernels/solve_cells.hpp"
 
 namespace isowave::core {
 
@@ -19,7 +19,7 @@ class SolveCells {
 
  private:
   ocl::Device *device_;
-  ocl::Kernel<ocl::In<Cubic>, uint, ocl::Out<float>> kernel_;
+  ocl::Kernel<kernels::solve_cells> kernel_;
 };
 
 }  // namespace isowave::core

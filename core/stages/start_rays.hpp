@@ -4,6 +4,7 @@
 
 #include "core/stages/levelled_kernel.hpp"
 #include "core/stages/macrocells.hpp"
+#include "kernels/start_rays.hpp"
 
 namespace isowave::core {
 
@@ -13,23 +14,21 @@ class StartRays {
   StartRays(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_size,
             bool levels = false, RaySource source = RaySource::kCamera);
 
-  /// Begins a frame, or a list of rays.
+  /// Begins a wave of rays.
   ///
+  /// begins_frame  and with it a frame, for the stamps of cache slots
   /// macrocells  of any level of detail, since levels share what is used of them
   /// In          rays.counts: next_active_count is 0
   /// Out         rays.hits_of(source): none; next_active_ray_ids and ray_block_ids of the rays that
   /// meet an
   ///             active block; counts.next_active_count: how many they are
   /// Waits       no
-  void operator()(const Macrocells &macrocells, Wavefront &rays);
+  void operator()(const Macrocells &macrocells, Wavefront &rays, bool begins_frame = true);
 
  private:
   RaySource source_;
   ocl::Range range_;
-  LevelledKernel<FrameParams, ocl::In<FrameParams>, uint, uint, ocl::In<GivenRay>, ocl::In<uint>,
-                 ocl::In<cl_ushort>, ocl::In<uint>, uint, ocl::Out<PassCounts>,
-                 ocl::Out<PassCounts>, ocl::Out<uint>, ocl::Out<uint>, ocl::Out<HitRecord>>
-      kernel_;
+  LevelledKernel<kernels::start_rays> kernel_;
 };
 
 }  // namespace isowave::core

@@ -26,7 +26,7 @@ ZfpDecode::ZfpDecode(ocl::Device &device, std::uint64_t max_blocks,
     : device_(device),
       stream_defines_(stream_defines),
       range_(ocl::Range::strided(max_blocks, ocl::kGroupSize, device)),
-      kernel_(device, "zfp_decode", "zfp_decode", all_defines(stream_defines, levels)) {
+      kernel_(device, all_defines(stream_defines, levels)) {
   const bool stream_on_host = DeviceStream::is_window(stream_defines);
   if (stream_on_host && levels)
     places_.emplace(device, sizes(max_blocks, stream_on_host, levels)["decode places"]);

@@ -4,10 +4,10 @@
 #include <optional>
 #include <span>
 
-#include "core/ocl/kernel.hpp"
 #include "core/stages/block_cache.hpp"
 #include "core/stages/wavefront.hpp"
 #include "core/stream/device_stream.hpp"
+#include "kernels/zfp_decode.hpp"
 
 namespace isowave::core {
 
@@ -67,11 +67,7 @@ class ZfpDecode {
   ocl::Range range_;
   std::optional<ocl::Buffer<uint>>
       places_;  ///< of this level's requests, where several levels' streams are in windows
-  ocl::Kernel<FrameParams, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>,
-              ocl::In<uint>, StreamLayout, FrameParams, ocl::In<uint>, ocl::In<uint>, StreamLayout,
-              uint, uint, ocl::In<PassCounts>, ocl::In<uint>, ocl::In<uint>, ocl::In<uint>,
-              ocl::Out<float>, ocl::Out<ulong>>
-      kernel_;
+  ocl::Kernel<kernels::zfp_decode> kernel_;
 };
 
 }  // namespace isowave::core

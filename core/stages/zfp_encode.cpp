@@ -51,10 +51,7 @@ glm::uvec3 largest_piece(const glm::uvec3 &dims) {
 
 }  // namespace
 
-ZfpEncode::ZfpEncode(ocl::Device &device)
-    : device_(device),
-      encode_(device, "zfp_encode", "zfp_encode"),
-      measure_(device, "zfp_encode", "zfp_encode_errors") {}
+ZfpEncode::ZfpEncode(ocl::Device &device) : device_(device), encode_(device), measure_(device) {}
 
 void ZfpEncode::compile(const ocl::Buffer<float> &voxels, ocl::Buffer<uint> &words,
                         ocl::Buffer<float> *errors) {

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "core/ocl/in_flight.hpp"
-#include "core/ocl/kernel.hpp"
 #include "core/volume/block_errors.hpp"
 #include "core/zfp/zfp_stream.hpp"
+#include "kernels/zfp_encode.hpp"
 #include "kernels_cl/portable/shared_types.h"
 
 namespace isowave::core {
@@ -46,8 +46,8 @@ class ZfpEncode {
 
  private:
   ocl::Device &device_;
-  ocl::Kernel<ocl::In<float>, uint, uint, uint, uint, ocl::Out<uint>> encode_;
-  ocl::Kernel<ocl::In<float>, uint, uint, uint, uint, ocl::In<uint>, ocl::Out<float>> measure_;
+  ocl::Kernel<kernels::zfp_encode> encode_;
+  ocl::Kernel<kernels::zfp_encode_errors> measure_;
 };
 
 /// Encodes a volume from its first layer to its last, in pieces of bounded size: while the device

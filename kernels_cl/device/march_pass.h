@@ -9,6 +9,7 @@
 /// anybody reads any of it.
 ///
 /// prev    counts of the pass before
+/// In      counts->window_count: 0, but in the first pass of a wave
 /// Out     counts: window_count, free_count
 ISO_INLINE void open_march(const FrameParams *frame, global const PassCounts *prev,
                            global PassCounts *counts, global PassCounts *next,
@@ -16,10 +17,9 @@ ISO_INLINE void open_march(const FrameParams *frame, global const PassCounts *pr
   open_next_counts(frame, counts, next);
   open_requests(cache);
   cache->first_block_id = ISO_INVALID_ID;
-  counts->window_count = counts->pass == counts->frame_pass
-                             ? first_window(frame)
-                             : next_window(frame, prev->window_count, prev->next_active_count,
-                                           prev->requested_count, counts->decoded_count);
+  if (counts->window_count == 0)
+    counts->window_count = next_window(frame, prev->window_count, prev->next_active_count,
+                                       prev->requested_count, counts->decoded_count);
   counts->free_count = cache->free_count;
 }
 

@@ -41,8 +41,8 @@ ISO_INLINE uint table_entry(uint bits, uint num_tiles, uint digit, uint tile) {
 
 /// Counts the digits of each tile. Groups stride over tiles.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void radix_histogram(
-    global const uint *keys, global const uint *counts, uint count_field, uint shift, uint bits,
-    global uint *table) {
+    global const uint *keys, global const ISO_WORDS(PassCounts) *counts, uint count_field,
+    uint shift, uint bits, global uint *table) {
   local uint histogram[ISO_RADIX_DIGITS];
   const uint count = counts[count_field], digits = 1u << bits, item = get_local_id(0);
   const uint num_tiles = (count + TILE - 1) / TILE;
@@ -77,7 +77,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void radix_hi
 /// Pairs of a digit in each tile -> in the tiles before; their sum to the table's beginning. A
 /// work-group per digit.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void radix_scan(
-    global const uint *counts, uint count_field, uint bits, global uint *table) {
+    global const ISO_WORDS(PassCounts) *counts, uint count_field, uint bits, global uint *table) {
   local uint sums[ISO_GROUP_SIZE];
   const uint num_tiles = (counts[count_field] + TILE - 1) / TILE, digit = get_group_id(0);
   global uint *row = table + table_entry(bits, num_tiles, digit, 0);
@@ -171,8 +171,8 @@ ISO_INLINE void place_round(uint round, uint size, uint shift, uint bits, local 
 
 /// Moves the pairs of each tile to their places. table: after radix_scan. Groups stride over tiles.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void radix_scatter(
-    global const uint *keys, global const uint *values, global const uint *counts, uint count_field,
-    uint shift, uint bits, global const uint *table, global uint *out_keys,
+    global const uint *keys, global const uint *values, global const ISO_WORDS(PassCounts) *counts,
+    uint count_field, uint shift, uint bits, global const uint *table, global uint *out_keys,
     global uint *out_values) {
   local uint sums[ISO_GROUP_SIZE];
   local uint bases[ISO_RADIX_DIGITS];

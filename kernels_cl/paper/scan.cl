@@ -1,7 +1,6 @@
 /// scan.cl -- exclusive prefix sum and stream compaction (Sec. 3.6, 4.2).
-/// Counts live on the device: `counts` are the uints of PassCounts, `count_field` says which of
-/// them is the number of entries. (A cast from the struct is what Mesa rusticl gets wrong:
-/// README.md of this folder.) Compaction = compact_count -> scan_exclusive of the tile sums ->
+/// Counts live on the device: `counts` are the words of PassCounts, `count_field` says which of
+/// them is the number of entries. Compaction = compact_count -> scan_exclusive of the tile sums ->
 /// compact_values. A tile is ISO_GROUP_SIZE * ISO_SCAN_ITEMS entries; groups stride over the tiles.
 /// No group ever waits for another one.
 #include "device/work_group.h"
@@ -13,7 +12,8 @@
 /// total_field  of counts: gets the sum of all; ISO_INVALID_ID: none does
 /// Launch       one work-group: made for tables of tiles, which are short
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void scan_exclusive(
-    global uint *values, global uint *counts, uint count_field, uint divisor, uint total_field) {
+    global uint *values, global ISO_WORDS(PassCounts) *counts, uint count_field, uint divisor,
+    uint total_field) {
   local uint sums[ISO_GROUP_SIZE];
   const uint count = (counts[count_field] + divisor - 1) / divisor;
   const uint total = scan_table(sums, values, count);
@@ -22,7 +22,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void scan_exc
 
 /// tile_sums[tile] = number of nonzero mask entries of the tile.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void compact_count(
-    global const uint *mask, global const uint *counts, uint count_field, global uint *tile_sums) {
+    global const uint *mask, global const ISO_WORDS(PassCounts) *counts, uint count_field,
+    global uint *tile_sums) {
   local uint sums[ISO_GROUP_SIZE];
   const uint count = counts[count_field];
   for (uint tile = get_group_id(0); tile * TILE < count; tile += get_num_groups(0)) {
@@ -39,8 +40,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void compact_
 /// out = values[i] of every i with mask[i] != 0, in order. tile_offsets: scanned sums of
 /// compact_count.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void compact_values(
-    global const uint *mask, global const uint *values, global const uint *counts, uint count_field,
-    global const uint *tile_offsets, global uint *out) {
+    global const uint *mask, global const uint *values, global const ISO_WORDS(PassCounts) *counts,
+    uint count_field, global const uint *tile_offsets, global uint *out) {
   local uint sums[ISO_GROUP_SIZE];
   const uint count = counts[count_field];
   for (uint tile = get_group_id(0); tile * TILE < count; tile += get_num_groups(0)) {

@@ -10,6 +10,9 @@
 #define ISO_NAMESPACE_END
 #define ISO_GLOBAL global      ///< address space of buffers
 #define ISO_CONSTANT constant  ///< address space of tables
+/// In a kernel's parameters: the host's buffer has elements of the struct T, and the kernel takes
+/// them as words (README.md of kernels_cl: a cast from the struct is what Mesa rusticl gets wrong).
+#define ISO_WORDS(T) uint
 #ifndef ISO_UNROLL /* by -D: empty where it makes programs slower to compile, not to run */
 #define ISO_UNROLL _Pragma("unroll")
 #endif
@@ -37,6 +40,7 @@ ISO_NAMESPACE_BEGIN
 #ifndef __OPENCL_C_VERSION__
 using uint = std::uint32_t;
 using ulong = std::uint64_t;
+using ushort = std::uint16_t;
 using uchar = std::uint8_t;
 using std::ceil;
 using std::fabs;
@@ -242,6 +246,12 @@ typedef struct StreamLayout {
                          ///< ISO_INVALID_ID: all voxels have data. Only read where ISO_NO_DATA is 1
 } StreamLayout;
 ISO_CHECK_SIZE(StreamLayout, 36);
+
+/// Values of some voxels of a block (macrocells.cl).
+typedef struct VoxelRange {
+  float min, max;  ///< min > max: no voxel
+} VoxelRange;
+ISO_CHECK_SIZE(VoxelRange, 8);
 
 #define ISO_ALL_PLANES (-1074)  ///< StreamLayout::min_exponent, and zfp's own
 #define ISO_REVERSIBLE (-1075)  ///< the same of a reversible stream: other blocks (zfp_codec.h)

@@ -68,7 +68,7 @@ class Processes:
         return result
 
 
-class BrickRenderer(Placed[_core.BrickRenderer]):
+class BrickRenderer(Placed[_core.Renderer]):
     """Draws a volume that may be larger than one machine: each process has a brick of it.
 
     The pictures have the bits of Renderer's. All processes of the communicator make the same calls
@@ -145,7 +145,7 @@ class BrickRenderer(Placed[_core.BrickRenderer]):
             return (width, height), compression, options
 
         self.size, compression, options = self._processes.together(read)
-        self._core = _core.BrickRenderer(self._processes, os.fsdecode(path), compression, options)
+        self._core = _core.team_renderer(self._processes, os.fsdecode(path), compression, options)
         if self._processes.rank == 0:
             for notice in self._core.notices:
                 warnings.warn(notice, RuntimeWarning, stacklevel=2)
@@ -205,7 +205,7 @@ class BrickRenderer(Placed[_core.BrickRenderer]):
             raise _core.Error("some processes give a camera, and others none: ask alike")
         if camera is None:
             request = replace(request, camera=self.camera(request.isovalue, request.size))
-        frame = self._core.render(request.for_core())
+        frame = self._core.render(request.for_core(), None, False)
         if self._processes.rank != 0:
             return None
         warn_of_isovalue(self._core, request.isovalue)

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from isowave import _core
-from isowave._arrays import as_source
+from isowave._arrays import ArraySource, as_source
 from isowave._checked import flag, number, reversed_axes, whole
 from isowave._volume import Volume, warn_of_file
 
@@ -75,7 +76,7 @@ class TqdmProgress:
 
 
 def make_progress(progress: bool | Progress | None) -> Progress | None:
-    """None: a bar where tqdm is installed and somebody watches."""
+    """None: a bar on a terminal or in a notebook, if tqdm is installed."""
     if callable(progress):
         return progress
     if progress is not None:
@@ -88,6 +89,17 @@ def make_progress(progress: bool | Progress | None) -> Progress | None:
     except ImportError:
         return None
     return TqdmProgress(tqdm)
+
+
+@contextlib.contextmanager
+def shown(progress: bool | Progress | None) -> Iterator[Progress | None]:
+    """The function that hears of progress; a bar is closed at the end."""
+    told = make_progress(progress)
+    try:
+        yield told
+    finally:
+        if isinstance(told, TqdmProgress):
+            told.close()
 
 
 def compress(
@@ -159,31 +171,34 @@ def compress(
         What cannot be compressed, in one line.
     """
     source = as_source(
-        array,
-        spacing=spacing,
-        origin=origin,
-        direction=direction,
-        fill_value=fill_value,
+        array, spacing=spacing, origin=origin, direction=direction, fill_value=fill_value
     )
     if no_data is None:
         no_data = source.no_data
     options = compression_options(
         tolerance, relative_tolerance, rate, exact, levels, map_nan, no_data, num_threads
     )
+    file = None if path is None else os.path.abspath(os.fsdecode(path))
+    with shown(progress) as told:
+        return Volume(compressed(array, source, options, file, told), file)
+
+
+def compressed(
+    array: Any,
+    source: ArraySource,
+    options: dict[str, Any],
+    file: str | None,
+    progress: Progress | None,
+) -> _core.Volume:
+    """source: what as_source() made of the array."""
     nz, ny, nx = source.shape
     columns: list[_core.Vector] = [column.tolist() for column in source.direction.T]
-    spacing_xyz, origin_xyz = reversed_axes(source.spacing), reversed_axes(source.origin)
-    grid = (str(source.dtype), (nx, ny, nz), spacing_xyz, origin_xyz, columns)
-    shown = make_progress(progress)
-    try:
-        if path is None and is_plain(array):
-            return Volume(_core.compress_array(array, *grid, options, shown))
-        keep = not isinstance(array, (np.ndarray, memoryview))  # these can be read again at no cost
-        file = None if path is None else os.path.abspath(os.fsdecode(path))
-        return Volume(_core.compress(source.read, *grid, options, keep, file, shown), file)
-    finally:
-        if isinstance(shown, TqdmProgress):
-            shown.close()
+    spacing, origin = reversed_axes(source.spacing), reversed_axes(source.origin)
+    grid = (str(source.dtype), (nx, ny, nz), spacing, origin, columns)
+    if file is None and is_plain(array):
+        return _core.compress_array(array, *grid, options, progress)
+    keep = not isinstance(array, (np.ndarray, memoryview))  # these can be read again at no cost
+    return _core.compress(source.read, *grid, options, keep, file, progress)
 
 
 def is_plain(array: Any) -> bool:
@@ -233,19 +248,15 @@ def open(  # noqa: A001: as gzip.open, h5py.File's habit
     )
     if is_compressed:
         options["measure_error"] = False
-    shown = make_progress(progress)
-    try:
+    with shown(progress) as told:
         core = _core.open(
             name,
             options,
             None if shape is None else dims_of(shape),
             None if dtype is None else np.dtype(dtype).name,
             None if spacing is None else reversed_axes(spacing),
-            shown,
+            told,
         )
-    finally:
-        if isinstance(shown, TqdmProgress):
-            shown.close()
     warn_of_file(core)
     if not is_compressed:
         return Volume(core)

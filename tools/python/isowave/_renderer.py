@@ -18,7 +18,7 @@ from isowave._camera import Camera
 from isowave._checked import flag, number, refuse, size_of, whole
 from isowave._image import Image
 from isowave._levels import Voxels
-from isowave._request import ALL_OUTPUTS, Color, Progress, Request, is_smooth
+from isowave._request import ALL_OUTPUTS, Color, Progress, Request, checked_normals
 
 #: Arguments of Renderer that let frames ask for more.
 CAPABILITIES = ("levels", "bounds", "time_budget", "rays")
@@ -28,7 +28,7 @@ def bytes_of(memory_budget: int | None) -> int | None:
     return None if memory_budget is None else whole("memory_budget", memory_budget, 2**64 - 1)
 
 
-def warn_of_isovalue(core: _core.Volume | _core.BrickRenderer, isovalue: float) -> None:
+def warn_of_isovalue(core: _core.Volume | _core.Renderer, isovalue: float) -> None:
     """Warns of an isovalue without a surface, at the line that called the package."""
     notice = core.isovalue_notice(isovalue)
     if not notice:
@@ -40,7 +40,7 @@ def warn_of_isovalue(core: _core.Volume | _core.BrickRenderer, isovalue: float) 
 
 
 def draw(
-    renderer: _core.Renderer | _core.HostRenderer, request: Request, interrupts: bool = True
+    renderer: _core.Renderer, request: Request, interrupts: bool = True
 ) -> dict[str, Any]:
     """The frame's arrays. interrupts: Ctrl-C is looked for after each pass."""
     on_pass = request.on_pass
@@ -61,7 +61,7 @@ def positions_of(volume: _core.Volume, positions: npt.NDArray[np.float64]) -> np
 
 
 def cast_rays(
-    renderer: _core.Renderer | _core.HostRenderer,
+    renderer: _core.Renderer,
     volume: _core.Volume,
     rays: npt.ArrayLike,
     isovalue: float,
@@ -75,7 +75,7 @@ def cast_rays(
     if array.ndim == 0 or array.shape[-1] != 6:
         raise ValueError(f"rays of shape {array.shape}: the last axis has 6: origin, direction")
     found = renderer.cast_rays(
-        array.reshape(-1, 6), number("isovalue", isovalue), is_smooth(normals)
+        array.reshape(-1, 6), number("isovalue", isovalue), checked_normals(normals)
     )
     lead = array.shape[:-1]
     return {
@@ -144,7 +144,7 @@ class Renderer:
         }
         self._volume = volume._core
         self._iterating: int | None = None  # the thread that looks at a picture of passes()
-        self._core = _core.Renderer(
+        self._core = _core.device_renderer(
             "" if device is None else str(device),
             volume._core,
             {

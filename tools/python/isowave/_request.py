@@ -72,7 +72,7 @@ class Request:
         if unknown:
             listed = ", ".join(sorted(unknown))
             raise ValueError(f"outputs {listed}: there are {', '.join(KNOWN_OUTPUTS)}")
-        is_smooth(self.normals)
+        checked_normals(self.normals)
         checked = {
             "isovalue": number("isovalue", self.isovalue),
             "camera": None if self.camera is None else camera_of(self.camera),
@@ -116,7 +116,7 @@ class Request:
             "samples": self.samples,
             "surface": self.color,
             "background": self.background,
-            "smooth_normals": is_smooth(self.normals),
+            "normals": self.normals,
             "voxel_pixels": self.voxel_pixels,
             "voxel_error": self.voxel_error,
             "max_surface_error": self.max_error,
@@ -153,10 +153,10 @@ def camera_of(camera: Any) -> Camera:
     )
 
 
-def is_smooth(normals: str) -> bool:
+def checked_normals(normals: str) -> str:
     if normals not in ("smooth", "cell"):
         raise ValueError(f"normals {normals!r}: give 'smooth' or 'cell'")
-    return normals == "smooth"
+    return normals
 
 
 def optional(name: str, value: Any) -> float | None:

@@ -80,7 +80,7 @@ class Volume(Voxels):
         self._lock = Turns()
         self._renderer: Renderer | None = None
         self._made_with: dict[str, Any] = {}
-        self._host: _core.HostRenderer | None = None
+        self._host: _core.Renderer | None = None
 
     def __reduce__(self) -> tuple[Callable[..., Volume], tuple[Any, ...]]:
         if self._file is not None:
@@ -177,9 +177,9 @@ class Volume(Voxels):
                 self._renderer = Renderer(self, size=largest, quick=True, **wanted)
         return self._renderer
 
-    def _host_renderer(self) -> _core.HostRenderer:
+    def _host_renderer(self) -> _core.Renderer:
         if self._host is None:
-            self._host = _core.HostRenderer(self._core, 0)
+            self._host = _core.host_renderer(self._core, 0)
         return self._host
 
     def cast_rays(

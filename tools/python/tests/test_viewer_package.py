@@ -15,7 +15,8 @@ from PIL import Image
 import isowave
 from isowave._request import Request
 from isowave.viewer.host import make_host
-from isowave.viewer.scene import Scene, Session
+from isowave.viewer.scene import Scene
+from isowave.viewer.session import Session
 
 if not isowave.devices():
     pytest.skip("no OpenCL device", allow_module_level=True)

@@ -15,7 +15,8 @@ from viewer_fakes import FakeVolume
 from isowave import Camera
 from isowave._request import Request
 from isowave.viewer.protocol import Ack, Budget, Hello, ProtocolError, Wish, check, parse
-from isowave.viewer.scene import Scene, Session
+from isowave.viewer.scene import Scene
+from isowave.viewer.session import Session
 
 CAMERA = {"eye": [0, 0, 5], "at": [0, 0, 0], "up": [0, 1, 0], "fovy_deg": 60}
 WISH: dict[str, Any] = {

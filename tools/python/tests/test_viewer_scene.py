@@ -17,8 +17,10 @@ from isowave._request import Request
 from isowave.viewer.pictures import Extent, Stopped, count_rays, dividing_value, encode_png
 from isowave.viewer.pictures import fit_size, share_within
 from isowave.viewer.protocol import Ack, Budget, ProtocolError, TokenBucket, Wish
-from isowave.viewer.scene import GIVE_BACK_SECONDS, MAX_CAMERA_RAYS, TURN_SECONDS
-from isowave.viewer.scene import Client, Scene, Session, Stage
+from isowave.viewer.renderers import GIVE_BACK_SECONDS, MAX_CAMERA_RAYS
+from isowave.viewer.scene import Scene
+from isowave.viewer.session import Session
+from isowave.viewer.turns import TURN_SECONDS, Client, Stage
 
 
 class Clock:
@@ -86,7 +88,7 @@ def run(scene: Scene) -> None:
     """Until nothing is to be done but for clients at rest."""
     for _ in range(1000):
         if not scene.step():
-            due = [c.due for c in scene._clients if c.stage is Stage.WHOLE]
+            due = [c.due for c in scene._turns.clients if c.stage is Stage.WHOLE]
             if not due:
                 return
             clock = scene._clock
@@ -700,10 +702,10 @@ def test_camera_rays_have_a_limit_of_their_own() -> None:
     eye = Eye(scene)
     eye.wish(size=(8192, 8192), ambient=255)
     assert eye.client.wish is not None
-    plan = scene._plan(eye.client.wish)
+    plan = scene._renderers.plan(eye.client.wish)
     assert 0.99 * MAX_CAMERA_RAYS < plan.rays <= MAX_CAMERA_RAYS and plan.ambient == 7
     owner = make_scene(FakeVolume(), Clock(), size=(8000, 8000))
-    assert owner._plan(eye.client.wish).rays == 64_000_000, "the server's own size counts"
+    assert owner._renderers.plan(eye.client.wish).rays == 64_000_000, "the server's own size counts"
 
 
 @pytest.mark.parametrize("option", ["max_rays", "max_clients"])
@@ -798,7 +800,7 @@ def test_closing_does_not_wait_for_a_long_pass_or_compilation(what: str) -> None
     may_end.set()
     for thread in scene._threads:
         thread.join(60)
-    assert not scene.is_busy and scene._renderer is None
+    assert not scene.is_busy and scene._renderers.renderer is None
 
 
 def test_others_get_pictures_while_a_larger_renderer_is_made() -> None:
@@ -910,14 +912,17 @@ def test_a_client_that_leaves_stops_its_frame_and_is_forgotten() -> None:
 
 def test_a_client_whose_transport_fails_is_forgotten() -> None:
     scene = make_scene(FakeVolume(), Clock())
-    eye = Eye(scene)
+    works = True
 
-    def broken(head: dict[str, Any], data: bytes | None) -> None:
-        raise RuntimeError("the loop is closed")
+    def post(head: dict[str, Any], data: bytes | None) -> None:
+        if not works:
+            raise RuntimeError("the loop is closed")
 
-    eye.client.post = broken
+    client = scene.join(post)
+    assert client is not None
+    works = False
     other = Eye(scene)
-    eye.wish()
+    scene.receive(client, wish_of(1))
     other.wish()
     run(scene)
     assert scene.num_clients == 1

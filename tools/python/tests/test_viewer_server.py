@@ -352,7 +352,7 @@ def test_a_client_that_reads_nothing_at_all_is_gone_in_the_end() -> None:
         raw.sendall(sent.encode() + masked(HELLO))
         assert eventually(lambda: server.scene.num_clients == 1)
         for _ in range(30):
-            server.scene._clients[0].post({"type": "picture"}, bytes(1 << 20))
+            server.scene._turns.clients[0].post({"type": "picture"}, bytes(1 << 20))
         assert eventually(lambda: server.scene.num_clients == 0 and not server._tasks)
         assert works(server)
 

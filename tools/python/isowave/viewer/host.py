@@ -22,7 +22,7 @@ class HostRenderer:
 
     def __init__(self, volume: Voxels) -> None:
         # A quarter of the host's memory at most; raises isowave.Error where that is not enough.
-        self._core = _core.HostRenderer(volume._core, 0)
+        self._core = _core.host_renderer(volume._core, 0)
         self.device = {"name": "host", "memory_bytes": 0}
 
     @property

@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image as pillow
 
+from isowave._request import Request
+
 JPEG_QUALITY: Final = 70
 
 
@@ -32,6 +34,12 @@ class Extent:
     size: tuple[int, int]
     samples: int
     ambient: int = 0
+
+    @staticmethod
+    def of(request: Request) -> Extent:
+        """All that a request with a size asks for."""
+        assert request.size is not None
+        return Extent(request.size, request.samples, request.ambient)
 
     @property
     def rays(self) -> int:

@@ -34,7 +34,8 @@ from websockets.server import ServerProtocol
 from .door import HEADERS, Door, Refused, Request, answer, hand_over, parse_head, read_head
 from .interfaces import VolumeLike
 from .protocol import MAX_MESSAGE_BYTES, ProtocolError, parse
-from .scene import Scene, Session, TooManyClients
+from .scene import Scene
+from .session import Session, TooManyClients
 
 POLICY: Final = (
     "default-src 'none'; script-src 'self'; connect-src 'self' ws://{host} wss://{host}; "

@@ -16,7 +16,8 @@ import traitlets
 
 from .interfaces import VolumeLike
 from .protocol import ProtocolError
-from .scene import Scene, Session, TooManyClients
+from .scene import Scene
+from .session import Session, TooManyClients
 
 MAX_VIEWS: Final = 8  # of a widget; the one that was silent for longest makes room
 

@@ -1,0 +1,138 @@
+"""What front ends are sent: view.js describes these messages."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .interfaces import ImageLike, VolumeLike
+from .pictures import Extent
+from .protocol import VERSION, first_line
+from .renderers import Renderers
+from .turns import Frame, Stage
+
+
+def welcome(
+    volume: VolumeLike, title: str, value_range: tuple[float, float], isovalue: float | None
+) -> dict[str, Any]:
+    """What is known of the volume. isovalue: the first one."""
+    return {
+        "type": "welcome",
+        "version": VERSION,
+        "title": title,
+        "shape": [int(n) for n in volume.shape],
+        "spacing": [float(s) for s in volume.spacing],
+        "dtype": str(volume.source_dtype),
+        "range": list(value_range),
+        "bits_per_voxel": float(volume.bits_per_voxel),
+        "max_error": finite(volume.max_error),
+        "isovalue": isovalue,
+    }
+
+
+def status(volume: VolumeLike, renderers: Renderers) -> dict[str, Any]:
+    renderer = renderers.renderer
+    state = "ready" if renderer else "failed" if renderers.failed else "starting"
+    return {
+        "type": "status",
+        "state": state,
+        "device": str(renderer.device["name"]) if renderer else None,
+        "notice": str(renderer.device["notice"]) if renderer else None,
+        "memory_bytes": int(renderer.memory_bytes) if renderer else None,
+        "device_memory": int(renderer.device["memory_bytes"]) if renderer else None,
+        "memory_budget": renderers.wanted.memory_budget,
+        "nbytes": int(volume.nbytes),
+    }
+
+
+def histogram(counts: NDArray[Any], edges: NDArray[Any]) -> dict[str, Any]:
+    return {
+        "type": "histogram",
+        "counts": [int(n) for n in counts],
+        "range": [float(edges[0]), float(edges[-1])],
+    }
+
+
+def error(raised: Exception, wish: int | None) -> dict[str, Any]:
+    """wish: the one that it concerns; None: it concerns all clients."""
+    return {"type": "error", "wish": wish, "message": first_line(raised)}
+
+
+def picture(frame: Frame, stage: str, seconds: float) -> dict[str, Any]:
+    """The head of a picture, which goes before its bytes."""
+    camera = frame.camera
+    return {
+        "type": "picture",
+        "wish": frame.wish.id,
+        "stage": stage,
+        "format": "jpeg",
+        "size": list(frame.extent.size),
+        "samples": frame.extent.samples,
+        "ambient": frame.extent.ambient,
+        "reduced": None,
+        "notice": "",
+        "isovalue": frame.wish.request.isovalue,
+        "camera": {
+            "eye": list(camera.eye),
+            "at": list(camera.at),
+            "up": list(camera.up),
+            "fovy_deg": camera.fovy,
+        },
+        "complete": False,
+        "ms": round(seconds * 1e3, 2),
+        "passes": frame.passes,
+        "percent": frame.percent,
+        "decoded_blocks": None,
+        "detail": None,
+    }
+
+
+def finished_picture(
+    frame: Frame, seconds: float, image: ImageLike, volume: VolumeLike, renderers: Renderers
+) -> dict[str, Any]:
+    statistics = image.statistics
+    return {
+        **picture(frame, frame.stage.value, seconds),
+        "reduced": reduced(frame, renderers),
+        "notice": volume.isovalue_notice(frame.wish.request.isovalue),
+        "complete": bool(image.complete),
+        "passes": int(statistics["passes"]),
+        "percent": 100.0,
+        "decoded_blocks": int(statistics["decoded_blocks"]),
+        "detail": plain(statistics.get("detail")),
+    }
+
+
+def reduced(frame: Frame, renderers: Renderers) -> str | None:
+    """Why a whole picture has fewer rays than its wish, in one line; None: it has all."""
+    asked, extent = Extent.of(frame.wish.request), frame.extent
+    if frame.stage is not Stage.WHOLE or extent == asked:
+        return None
+    why = "The device has no memory for more"
+    most, first = renderers.max_rays, renderers.first_ray_limit
+    if asked != asked.within(first, most):
+        why = f"The server draws at most {most:,} rays, {min(first, most):,} from the camera"
+    width, height = extent.size
+    rays, ambient = count(extent.samples**2, "ray"), count(extent.ambient, "ambient ray")
+    return f"{why}: this picture has {width} x {height} pixels, {rays} a pixel, {ambient}."
+
+
+def count(number: int, thing: str) -> str:
+    return f"{number} {thing}{'s' * (number != 1)}"
+
+
+def finite(value: object) -> float | None:
+    if isinstance(value, (int, float, np.number)) and math.isfinite(float(value)):
+        return float(value)
+    return None
+
+
+def plain(value: object) -> dict[str, Any] | None:
+    """A dict of numbers and texts, without what JSON does not have."""
+    if not isinstance(value, Mapping):
+        return None
+    return {str(key): v if isinstance(v, (bool, str)) else finite(v) for key, v in value.items()}

@@ -1,0 +1,248 @@
+"""The renderer of a scene: made for what clients want, and anew when that changes."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+from .interfaces import RendererLike, VolumeLike
+from .pictures import Extent
+from .protocol import TokenBucket, Wish, first_line
+from .turns import Stage
+
+FIRST_DIVISOR: Final = 4  # of width and height, for the first picture
+HOST_SECONDS: Final = 0.5  # for a device to be ready, before the host draws meanwhile
+GIVE_BACK_SECONDS: Final = 5.0  # without need of a large renderer, until a smaller one is made
+MAX_CAMERA_RAYS: Final = 1 << 24  # of a picture: they take memory, and make passes long
+
+
+@dataclass(frozen=True)
+class RendererOptions:
+    """What the scene's renderer is made for."""
+
+    largest: Extent  # of a picture
+    memory_budget: int | None
+    ambient: bool = False  # pictures may have ambient rays, which takes memory
+
+    @property
+    def rays(self) -> int:
+        return self.largest.rays
+
+
+class Renderers:
+    """The device's renderer, and the host's while the device's is being made.
+
+    device    as in isowave.Renderer
+    first     what the first renderer is made for; none is made for less
+    max_rays  of a client's picture, with the ambient ones
+    make_host makes the host's renderer, or None
+    changed   the scene's lock; whoever waits for a renderer is notified
+    wishes    those of the clients now
+    tell      hears of a change: an error, or None. The lock is held
+    do        works in another thread
+    clock     seconds
+    """
+
+    def __init__(
+        self,
+        volume: VolumeLike,
+        *,
+        device: str | None,
+        first: RendererOptions,
+        max_rays: int,
+        make_host: Callable[[VolumeLike], RendererLike | None] | None,
+        changed: threading.Condition,
+        wishes: Callable[[], list[Wish]],
+        tell: Callable[[Exception | None], None],
+        do: Callable[[Callable[[], None]], None],
+        clock: Callable[[], float],
+    ) -> None:
+        self._volume, self._device, self._make_host = volume, device, make_host
+        self._changed, self._wishes, self._tell = changed, wishes, tell
+        self._do, self._clock = do, clock
+        self.renderer: RendererLike | None = None
+        self.host: RendererLike | None = None  # draws until there is a renderer
+        self.failed = False
+        self.failure = ""  # why there is no renderer
+        self.is_making = False
+        self._closing = False
+        self._base, self.wanted = first.largest, first
+        self._made: RendererOptions | None = None  # what the renderer was made for
+        self._fallback: RendererOptions | None = None  # worked before
+        self._too_large_since: float | None = None  # the renderer, for what clients want
+        self._budgets = TokenBucket(1 / GIVE_BACK_SECONDS, 5, clock)  # each makes a renderer
+        self.max_rays = max_rays
+        self._ray_limit = self.first_ray_limit = max(MAX_CAMERA_RAYS, first.rays)
+        self._may_have_ambient = True
+
+    @property
+    def never_worked(self) -> bool:
+        return self.failed and self._fallback is None
+
+    @property
+    def must_make(self) -> bool:
+        """Whether the renderer is another one than is wanted, and none is being made."""
+        return not (self._made == self.wanted or self.failed or self.is_making)
+
+    def can_draw(self, stage: Stage) -> bool:
+        """Whether a stage may begin. If no renderer could be made, it ends with that error."""
+        if self.renderer is not None or self.failed:
+            return True
+        return self.host is not None and stage is not Stage.CERTAIN
+
+    def close(self) -> None:
+        """Lets the renderers go; a frame that is being drawn still holds one."""
+        self._closing = True
+        self.renderer = self.host = None
+
+    # How large pictures are.
+
+    def plan(self, wish: Wish) -> Extent:
+        """The whole picture of a wish, as far as the server's limits and the memory allow it."""
+        ambient = wish.request.ambient if self._may_have_ambient else 0
+        return replace(Extent.of(wish.request), ambient=ambient).within(
+            self._ray_limit, self.max_rays
+        )
+
+    def fitted(self, wish: Wish, stage: Stage) -> Extent:
+        """A stage's picture, within what the renderer was made for.
+
+        The host, which draws before there is a renderer of the device, has no limits of its own.
+        """
+        made, plan = self._made, self.plan(wish)
+        if stage is not Stage.WHOLE:
+            width, height = (max(1, side // FIRST_DIVISOR) for side in wish.size)
+            plan = Extent((width, height), 1)
+        if made is None:
+            return plan.within(self._ray_limit, self.max_rays)
+        fitted = plan.within(made.rays, self.max_rays)
+        return fitted if made.ambient else replace(fitted, ambient=0)
+
+    # What renderer is wanted.
+
+    def grow(self, wish: Wish, stage: Stage) -> bool:
+        """Wants a renderer for more rays, or ambient ones, if the wish's picture has such."""
+        wanted, plan = self.wanted, self.plan(wish)
+        ambient = wanted.ambient or plan.ambient > 0
+        if stage is Stage.FIRST or (plan.rays <= wanted.rays and ambient == wanted.ambient):
+            return False
+        largest = replace(plan, ambient=0) if plan.rays > wanted.rays else wanted.largest
+        self._want(RendererOptions(largest, wanted.memory_budget, ambient))
+        return True
+
+    def set_budget(self, memory_budget: int | None) -> bool:
+        """Wants a renderer with another memory budget. False: the budget changes too often."""
+        if not self._budgets.take():
+            return False
+        self._want(replace(self.wanted, memory_budget=memory_budget))
+        return True
+
+    def _needed(self) -> RendererOptions:
+        """The smallest renderer for what clients want now. The lock is held."""
+        plans = [self.plan(wish) for wish in self._wishes()]
+        largest = max((self._base, *plans), key=lambda plan: plan.rays)
+        ambient = any(plan.ambient > 0 for plan in plans)
+        return RendererOptions(replace(largest, ambient=0), self.wanted.memory_budget, ambient)
+
+    def note_needs(self) -> None:
+        """Notes since when the renderer is much larger than clients need. The lock is held."""
+        needed, wanted = self._needed(), self.wanted
+        fits = needed.rays > wanted.rays / 2 and needed.ambient >= wanted.ambient
+        if fits:
+            self._too_large_since = None
+        elif self._too_large_since is None:
+            self._too_large_since = self._clock()
+
+    @property
+    def give_back_due(self) -> float | None:
+        """When a smaller renderer is made, unless clients come to need the larger one."""
+        return None if self._too_large_since is None else self._too_large_since + GIVE_BACK_SECONDS
+
+    def give_back(self) -> None:
+        """Wants a smaller renderer if clients have not needed a large one for long."""
+        with self._changed:
+            if self.give_back_due is not None and self._clock() >= self.give_back_due:
+                self._too_large_since = None
+                self._want(self._needed())
+
+    def _want(self, options: RendererOptions) -> None:
+        with self._changed:
+            if options.memory_budget != self.wanted.memory_budget:
+                self._ray_limit, self._may_have_ambient = self.first_ray_limit, True
+            self.wanted, self.failed = options, False
+            self.note_needs()
+
+    # How it is made.
+
+    def make(self) -> None:
+        """Replaces the renderer. Memory for two is rarely there: the old one goes first.
+
+        Kernels may take long to compile: in another thread, and the host draws meanwhile.
+        """
+        with self._changed:
+            self.is_making, wanted = True, self.wanted
+            self.renderer, self._made = None, None
+            self._tell(None)
+        self._do(lambda: self._make_for_device(wanted))
+        if self._make_host is not None:
+            self._do(self._make_for_host)
+
+    def _make_for_device(self, wanted: RendererOptions) -> None:
+        options: dict[str, Any] = {
+            "device": self._device,
+            "size": wanted.largest.size,
+            "samples": wanted.largest.samples,
+            "memory_budget": wanted.memory_budget,
+            "levels": self._volume.num_levels > 1,
+            "bounds": True,
+            "time_budget": True,
+            "rays": wanted.ambient,
+        }
+        try:
+            renderer = self._volume.renderer(**options)
+        except Exception as error:
+            self._device_failed(wanted, error)
+            return
+        with self._changed:
+            self.is_making, self.host = False, None
+            if self._closing:
+                return
+            self.renderer, self._made, self._fallback = renderer, wanted, wanted
+            self._tell(None)
+            self._changed.notify_all()
+
+    def _device_failed(self, wanted: RendererOptions, error: Exception) -> None:
+        """Goes back to what worked. If nothing did, waits for another budget."""
+        with self._changed:
+            self.is_making = False
+            fallback = self._fallback if self._fallback != wanted else None
+            if self.wanted == wanted:
+                self.failed, self.failure = fallback is None, first_line(error)
+                self.host = None
+                if fallback is not None:
+                    self.wanted = fallback
+                    if wanted.rays > fallback.rays:
+                        self._ray_limit = fallback.rays
+                    if wanted.ambient and not fallback.ambient:
+                        self._may_have_ambient = False
+            self._tell(error)
+            self._changed.notify_all()
+
+    def _make_for_host(self) -> None:
+        def is_over() -> bool:
+            return self._closing or not self.is_making
+
+        with self._changed:
+            if self.host is not None or self._changed.wait_for(is_over, HOST_SECONDS):
+                return
+        try:
+            assert self._make_host is not None
+            host = self._make_host(self._volume)
+        except Exception:  # there is not enough memory: then nothing is drawn meanwhile
+            return
+        with self._changed:
+            if not is_over():
+                self.host = host
+                self._changed.notify_all()

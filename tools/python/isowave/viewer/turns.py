@@ -1,0 +1,171 @@
+"""Whose picture is next: clients, the stages of their wishes, and the order of their turns."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from isowave._camera import Camera
+
+from .pictures import Extent
+from .protocol import ProtocolError, Wish
+
+MAX_IN_FLIGHT: Final = 2  # pictures on the way to a client
+QUICK_SECONDS: Final = 0.02  # a whole picture that needs no first one
+GIVE_WAY_SECONDS: Final = 0.15  # of a picture, before smaller ones come between; then twice as long
+TURN_SECONDS: Final = 5.0  # of a picture, at most, before smaller ones come between
+
+Post = Callable[[dict[str, Any], bytes | None], None]
+"""Sends a message, and the bytes of a picture with it. Must not block, and may be called from any
+thread."""
+
+
+class Stage(Enum):
+    """What is to be done next for a client's wish."""
+
+    FIRST = "first"
+    WHOLE = "whole"
+    LOSSLESS = "lossless"
+    ENCODING = "encoding"  # the lossless picture, in a thread of its own
+    CERTAIN = "certain"
+    DONE = "done"
+
+
+@dataclass(eq=False)
+class Client:
+    """One front end's state. Only the scene changes it, under its lock."""
+
+    post: Post
+    wish: Wish | None = None
+    stage: Stage = Stage.DONE
+    camera: Camera | None = None  # of the wish, once it is known
+    gave_way: int = 0  # how often the wish's whole picture was interrupted for another client
+    due: float = -math.inf  # when the stage may begin
+    lossless: tuple[dict[str, Any], NDArray[np.uint8]] | None = None  # what it is made of
+    sent: int = 0  # pictures, numbered from 1
+    acked: int = 0
+    waiting: tuple[dict[str, Any], bytes] | None = None  # the last picture that was held back
+    whole_seconds: float = math.inf  # of the last whole picture
+    shown: float = -math.inf  # when the last picture was sent
+    joined: bool = True
+
+    def take(self, wish: Wish) -> None:
+        """The next wish, which ends the one before. Raises ProtocolError."""
+        if self.wish is not None and wish.id <= self.wish.id:
+            raise ProtocolError("the numbers of wishes must grow")
+        skip_first = self.whole_seconds < QUICK_SECONDS or wish.request.time_budget is not None
+        self.wish, self.camera = wish, wish.request.camera
+        self.stage = Stage.WHOLE if skip_first else Stage.FIRST
+        self.gave_way, self.lossless, self.due = 0, None, -math.inf
+
+    def leave(self) -> None:
+        self.joined = False
+        self.wish = self.lossless = self.waiting = None
+        self.stage = Stage.DONE
+
+    @property
+    def takes_more(self) -> bool:
+        """Whether fewer pictures are on the way than may be."""
+        return self.sent - self.acked < MAX_IN_FLIGHT
+
+    def acknowledge(self, frame: int, now: float) -> None:
+        """A picture has come. Raises ProtocolError."""
+        if frame > self.sent:
+            raise ProtocolError("a picture was acknowledged that was not sent")
+        self.acked = max(self.acked, frame)
+        if self.waiting is not None and self.takes_more:
+            (head, data), self.waiting = self.waiting, None
+            self._send(head, data, now)
+
+    def offer(self, head: dict[str, Any], data: bytes, now: float, *, keep: bool) -> None:
+        """Sends a picture. While two are on the way, holds it back, or, not kept, leaves it out."""
+        if self.takes_more:
+            self.waiting = None
+            self._send(head, data, now)
+        elif keep:
+            self.waiting = head, data
+
+    def _send(self, head: dict[str, Any], data: bytes, now: float) -> None:
+        self.sent += 1
+        self.shown = now
+        self.post({**head, "frame": self.sent}, data)
+
+
+@dataclass
+class Frame:
+    """A frame that is being drawn."""
+
+    client: Client
+    wish: Wish
+    stage: Stage
+    camera: Camera
+    began: float
+    extent: Extent
+    passes: int = 0
+    percent: float = 0.0  # of its rays that have ended
+    by_host: bool = False
+    last_sent: float = -math.inf
+    sending_took: float = 0.0  # seconds of the last picture of a pass
+    stopped: bool = False
+
+
+class Turns:
+    """The clients, in the order of their turns. All calls need the scene's lock.
+
+    can_draw  whether there is a renderer for a stage
+    """
+
+    def __init__(self, can_draw: Callable[[Stage], bool], clock: Callable[[], float]) -> None:
+        self._can_draw, self._clock = can_draw, clock
+        self.clients: list[Client] = []
+
+    def wishes(self) -> list[Wish]:
+        return [client.wish for client in self.clients if client.wish is not None]
+
+    def next(self) -> tuple[Client, Wish, Stage] | None:
+        """The first client in the row that something is to be done for; it goes to the end."""
+        for client in self.clients:
+            if self.has_turn(client) and client.wish is not None:
+                self.clients.remove(client)
+                self.clients.append(client)
+                return client, client.wish, client.stage
+        return None
+
+    def due(self) -> list[float]:
+        """When clients' stages may begin that only wait for their time."""
+        return [client.due for client in self.clients if self._may_begin(client)]
+
+    def has_turn(self, client: Client) -> bool:
+        return self._may_begin(client) and self._clock() >= client.due
+
+    def _may_begin(self, client: Client) -> bool:
+        """Whether there is all that the client's stage needs, but for time."""
+        if client.stage in (Stage.DONE, Stage.ENCODING, Stage.LOSSLESS):
+            return client.stage is Stage.LOSSLESS
+        return self._can_draw(client.stage)
+
+    def give_way(self, frame: Frame, now: float, fitted: Callable[[Wish, Stage], Extent]) -> bool:
+        """A picture that takes long lets smaller ones of others come between, and is drawn anew.
+
+        It is drawn twice as long each time before it gives way, up to TURN_SECONDS.
+        """
+        client = frame.client
+        turn = min(GIVE_WAY_SECONDS * 2.0**client.gave_way, TURN_SECONDS)
+        if frame.stage is not Stage.WHOLE or now - frame.began < turn:
+            return False
+        gives_way = any(
+            other.wish is not None
+            and other.stage in (Stage.FIRST, Stage.WHOLE)
+            and self.has_turn(other)
+            and fitted(other.wish, other.stage).all_rays < frame.extent.all_rays
+            for other in self.clients
+            if other is not client
+        )
+        client.gave_way += gives_way
+        return gives_way
