@@ -266,6 +266,14 @@ bool show_pass(Callbacks &callbacks, const std::optional<nb::callable> &on_pass,
 
 /// Any of the library's renderers.
 class PyRenderer {
+  /// Calls work(callbacks) without the GIL, and raises what a callback has raised.
+  template <class Work>
+  auto without_gil(const Work &work) {
+    if (processes_) return processes_->without_gil(work);
+    Callbacks callbacks;
+    return callbacks.without_gil([&] { return work(callbacks); });
+  }
+
  public:
   using Owned = std::unique_ptr<isowave::Renderer, DestroyWithoutGil<isowave::Renderer>>;
 
@@ -384,14 +392,6 @@ class PyRenderer {
   const isowave::Renderer &renderer() const { return *renderer_; }
 
  private:
-  /// Calls work(callbacks) without the GIL, and raises what a callback has raised.
-  template <class Work>
-  auto without_gil(const Work &work) {
-    if (processes_) return processes_->without_gil(work);
-    Callbacks callbacks;
-    return callbacks.without_gil([&] { return work(callbacks); });
-  }
-
   std::unique_ptr<PyProcesses>
       processes_;  ///< a team's; the renderer does not call it when it goes
   Owned renderer_;
