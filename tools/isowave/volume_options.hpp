@@ -15,6 +15,10 @@
 #include "core/volume/volume.hpp"
 #include "core/zfp/zfp_stream.hpp"
 
+namespace isowave::core::ocl {
+class Device;
+}
+
 namespace isowave::core::tools {
 
 /// Options as typed; to_overrides() checks them.
