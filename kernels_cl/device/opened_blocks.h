@@ -18,16 +18,6 @@
 /// In OpenedBlock::have: the block itself is cached, and its cells are known.
 #define ISO_OPENED_CACHED 0x100u
 
-/// The cache (block_cache.cl), as a work-item looks into it.
-typedef struct CacheReader {
-  global BlockEntry *table;
-  global const ulong *inside;
-  global const float *values;
-  global uint *slot_stamps;
-  uint stamp;           ///< read_stamp() of the pass: whoever opens a cached block stamps it
-  local uint *scratch;  ///< [8 * ISO_GROUP_SIZE]
-} CacheReader;
-
 typedef struct OpenedBlock {
   uint block_id;  ///< ISO_INVALID_ID: none so far
   uint have;      ///< bits 0..7: corners of the dual grid whose voxels are here, or that no cell
@@ -58,18 +48,17 @@ ISO_INLINE void copy_corner(global const float *values, uint corner, float *voxe
 /// Opens block b with what is cached of its dual grid.
 ISO_SELDOM void open_with_voxels(const CacheReader *cache, const FrameParams *frame, BlockCoords b,
                                  OpenedBlock *opened) {
-  local uint *slots = cache->scratch;
   uint have;
-  const ulong cells = open_block(frame, cache->table, cache->inside, b, slots, &have);
+  const ulong cells = open_block(frame, cache, b, &have);
   opened->block_id = block_id_at(frame, b.x, b.y, b.z);
   opened->have = have;
   opened->cells_low = (uint)cells;
   opened->cells_high = (uint)(cells >> 32);
   if ((have & 1u) == 0) return;
   opened->have |= ISO_OPENED_CACHED;
-  cache->slot_stamps[slots[0]] = cache->stamp; /* for all of the dual grid: last_use() */
+  stamp_block(cache);
   _Pragma("unroll") for (uint corner = 0; corner < 8; ++corner) {
-    const uint slot = slots[corner * ISO_GROUP_SIZE];
+    const uint slot = cache->slots[corner * ISO_GROUP_SIZE];
     if (slot != ISO_BLOCK_ABSENT)
       copy_corner(cache->values + slot * ISO_BLOCK_VOXELS, corner, opened->voxels);
   }
