@@ -27,7 +27,7 @@
 #define ISO_TILE_PACKETS (ISO_TILE_COLUMNS * ISO_TILE_ROWS / ISO_LANES)
 #define ISO_LIST_PACKETS 32u
 
-/// What has become of the rays of a packet.
+/// The progress of the rays of a packet.
 typedef struct PacketProgress {
   Mask met;         ///< have come to an active block
   Mask moved;       ///< to a second one

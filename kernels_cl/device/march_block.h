@@ -18,7 +18,7 @@ typedef struct CacheReader {
   local uint *slots;  ///< scratch for the slots of a dual grid: 8, ISO_GROUP_SIZE apart
 } CacheReader;
 
-/// What became of a ray.
+/// The end of a ray's way through a block.
 #define ISO_RAY_LEFT 0          ///< it left the block, or the volume
 #define ISO_RAY_HIT 1           ///< equal to what isolate() returns, as is
 #define ISO_RAY_DOUBT 2         ///< the next march settles it
@@ -63,8 +63,8 @@ ISO_INLINE ulong cells_of_corners(uint corners) {
 }
 
 #if ISO_ON_DEMAND
-/// What the table knows of the cells of block b. To be asked when its slot has been seen: what was
-/// read of the entry before that may be older (on_demand.h).
+/// The cells of block b that the table knows. To be called when the block's slot has been seen:
+/// parts of the entry that were read before the slot may be older (on_demand.h).
 ISO_INLINE ulong known_cells(const FrameParams *frame, global const BlockEntry *table,
                              BlockCoords b) {
   volatile global const BlockEntry *entry = &table[find_entry(frame, table, b.x, b.y, b.z)];
@@ -72,8 +72,8 @@ ISO_INLINE ulong known_cells(const FrameParams *frame, global const BlockEntry *
 }
 #endif
 
-/// Which cells of block b a ray must look into: those in which inside changes, and those that need
-/// a block that is not cached. The cells are kept in the block's table entry for the next ray.
+/// The cells of block b that a ray must look into: those in which inside changes, and those that
+/// need a block that is not cached. The cells are kept in the block's table entry for the next ray.
 ///
 /// Out  cache->slots; *have: which corners of the dual grid are cached, or beyond the volume, where
 ///      no cell of the domain reaches

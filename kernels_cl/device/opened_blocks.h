@@ -3,8 +3,8 @@
 /// (march_packets.cl). OpenCL C 1.2.
 ///
 /// A table has a place for each position in a group of 4^3 blocks; a block that comes later takes
-/// the place of another at the same position. No block leaves the cache meanwhile, so that whoever
-/// has lost its place may look the block up again.
+/// the place of another at the same position. No block leaves the cache meanwhile, so a ray
+/// whose block has lost its place may look the block up again.
 #ifndef ISOWAVE_OPENED_BLOCKS_H
 #define ISOWAVE_OPENED_BLOCKS_H
 
@@ -68,7 +68,7 @@ ISO_SELDOM void open_with_voxels(const CacheReader *cache, const FrameParams *fr
 /// pass by the cells of every third block. Else returns 0.
 ISO_INLINE int open_without_voxels(const CacheReader *cache, const FrameParams *frame,
                                    BlockCoords b, OpenedBlock *opened) {
-  /* What is read of an entry before its slot may be older (on_demand.h). */
+  /* Parts of an entry that are read before its slot may be older (on_demand.h). */
   volatile global const BlockEntry *entries = cache->table;
   const uint entry = find_entry(frame, cache->table, b.x, b.y, b.z),
              slot = entry == ISO_INVALID_ID ? ISO_BLOCK_ABSENT : entries[entry].slot;
