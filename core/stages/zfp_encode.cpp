@@ -191,6 +191,7 @@ class DeviceCoder : public LevelCoder {
 
   std::vector<float> finish(CompressedVolume &volume) override {
     encoder_.finish(sink_);
+    device_.timer().collect();  // the stage times belong to no frame
     if (measure_error_) volume.max_voxel_error = encoder_.errors().max();
     return encoder_.errors().take();
   }
