@@ -80,14 +80,17 @@ Frame CoreImplementation::draw(const FrameRequest &request) {
     wanted.max_surface_error.reset();
     if (team.rank() == 0) frame.detail = public_choice(*stats.detail);
   }
-  fetch(request, wanted, frame);
+  fetch(request, frame);
   frame.statistics.hits = renderer_->num_hits(stats);
+  if (request.want_bounds) {  // last, since it draws frames of its own
+    const std::vector<float> depth = request.want_depth ? frame.depth : renderer_->depth();
+    frame.bounds = core::certify(*renderer_, volume_, wanted, depth).bounds;
+  }
   return frame;
 }
 
-/// Gets what the request wants of the frame that was drawn.
-void CoreImplementation::fetch(const FrameRequest &request, const core::FrameRequest &drawn,
-                               Frame &frame) {
+/// Gets what the request wants of the frame that was drawn, except bounds.
+void CoreImplementation::fetch(const FrameRequest &request, Frame &frame) {
   if (request.want_picture)
     frame.picture = renderer_->shade(core_appearance(request.appearance)).pixels;
   if (request.want_normals || request.want_positions || request.want_hits) {
@@ -95,9 +98,6 @@ void CoreImplementation::fetch(const FrameRequest &request, const core::FrameReq
   } else if (request.want_depth) {
     frame.depth = renderer_->depth();
   }
-  if (!request.want_bounds) return;
-  const std::vector<float> depth = request.want_depth ? frame.depth : renderer_->depth();
-  frame.bounds = core::certify(*renderer_, volume_, drawn, depth).bounds;
 }
 
 Frame CoreImplementation::cast_rays(std::span<const Ray> rays, double isovalue, Normals normals) {

@@ -58,7 +58,7 @@ class CoreImplementation : public Renderer::Implementation {
 
  private:
   Frame draw(const FrameRequest &request);
-  void fetch(const FrameRequest &request, const core::FrameRequest &drawn, Frame &frame);
+  void fetch(const FrameRequest &request, Frame &frame);
   /// For other threads, that may ask while a frame is drawn.
   void note_memory() { memory_bytes_ = renderer_->memory_bytes(); }
 

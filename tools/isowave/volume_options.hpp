@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/ocl/device.hpp"
 #include "core/sources/load_volume.hpp"
 #include "core/volume/block_box.hpp"
 #include "core/volume/volume.hpp"
