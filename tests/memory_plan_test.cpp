@@ -424,7 +424,7 @@ TEST_P(GrowingCacheOnDevice, AfterFramesThatWereStopped) {
 /// What a frame's ambient rays need is the frame's.
 TEST_P(GrowingCacheOnDevice, UntilAmbientRaysFit) {
   if (is_simulator(GetParam().device)) GTEST_SKIP() << "takes a simulator too long";
-  Renderer renderer = renderer_of({.first_slots = 16, .with_given_rays = true});
+  DeviceRenderer renderer = renderer_of({.first_slots = 16, .with_given_rays = true});
   FrameRequest request{.camera = camera_, .isovalue = kIsovalue};
   for (int frame = 0; frame < 8; ++frame) draw(renderer, request);
   const std::uint32_t of_camera = renderer.memory_plan().cache_slots;

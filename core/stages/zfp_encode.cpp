@@ -180,7 +180,8 @@ class DeviceCoder : public LevelCoder {
  public:
   DeviceCoder(ocl::Device &device, const glm::uvec3 &dims, const CompressOptions &options,
               const PayloadSink &sink, bool keep)
-      : encoder_(device, dims, 64 * options.rate, options.measure_error, BlockErrors(keep)),
+      : device_(device),
+        encoder_(device, dims, 64 * options.rate, options.measure_error, BlockErrors(keep)),
         measure_error_(options.measure_error),
         sink_(sink) {}
 
@@ -199,6 +200,7 @@ class DeviceCoder : public LevelCoder {
   std::span<const float> decoded() const override { return {}; }
 
  private:
+  ocl::Device &device_;
   LayerEncoder encoder_;
   bool measure_error_;
   const PayloadSink &sink_;
