@@ -29,6 +29,10 @@ def drawn(tmp_path_factory, levelled):
     if shutil.which("mpirun") is None:
         pytest.skip("there is no mpirun: apt install openmpi-bin")
     folder = tmp_path_factory.mktemp("bricks")
+    # Kernels are compiled here, once: each process would compile them all.
+    isowave.open(FUEL, exact=True).renderer(size=(96, 64), samples=2, rays=True)
+    for bounds in (False, True):
+        isowave.open(levelled).renderer(size=(64, 48), levels=True, bounds=bounds)
     program = pathlib.Path(__file__).with_name("draw_bricks.py")
     mpirun = ["mpirun", "-q", "--oversubscribe", "--bind-to", "none", "--allow-run-as-root"]
     command = [*mpirun, "-n", RANKS, sys.executable, program, FUEL, levelled, folder]
