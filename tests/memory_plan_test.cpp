@@ -239,6 +239,7 @@ TEST(MemoryPlan, FirstSlotsAreForWhatAFrameNeeds) {
   constexpr std::uint64_t kRays = 1280 * 720;
   EXPECT_EQ(first_cache_slots(128 * 128 * 128, kRays), 12u * 128 * 128) << "of the volume";
   EXPECT_EQ(first_cache_slots(256 * 256 * 256, kRays), kRays / 8 * 5) << "of the picture";
+  EXPECT_EQ(first_cache_slots(128 * 128 * 128, kRays, true), 24u * 128 * 128) << "and of its hits";
   EXPECT_EQ(first_cache_slots(64 * 64 * 64, 800), 16'384u) << "not worth saving";
   EXPECT_EQ(first_cache_slots(16'384, kRays), 16'384u) << "all";
   EXPECT_EQ(first_cache_slots(27, kRays), 27u) << "all";
@@ -424,7 +425,7 @@ TEST_P(GrowingCacheOnDevice, AfterFramesThatWereStopped) {
 /// What a frame's ambient rays need is the frame's.
 TEST_P(GrowingCacheOnDevice, UntilAmbientRaysFit) {
   if (is_simulator(GetParam().device)) GTEST_SKIP() << "takes a simulator too long";
-  Renderer renderer = renderer_of({.first_slots = 16, .with_given_rays = true});
+  DeviceRenderer renderer = renderer_of({.first_slots = 16, .with_given_rays = true});
   FrameRequest request{.camera = camera_, .isovalue = kIsovalue};
   for (int frame = 0; frame < 8; ++frame) draw(renderer, request);
   const std::uint32_t of_camera = renderer.memory_plan().cache_slots;
