@@ -4,7 +4,7 @@
 #include "bench/scenes.hpp"
 #include "core/base/error.hpp"
 #include "core/io/raw_reader.hpp"
-#include "core/sources/noise_field.hpp"
+#include "core/sources/noise_on_device.hpp"
 
 namespace isowave::core::bench {
 namespace {

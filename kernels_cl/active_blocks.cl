@@ -17,15 +17,14 @@ ISO_INLINE uint mask_bit(const FrameParams *frame, global const uint *masks, uin
   return masks[2 * coarse + (z >> 1 & 1)] >> ((x & 3) + 4 * (y & 3) + 16 * (z & 1)) & 1u;
 }
 
-/// 1 where a block is the last along an axis and has one layer of voxels, else 0.
+/// 1 if a block is the last along an axis and has one layer of voxels, else 0.
 ISO_INLINE uint is_one_layer(uint block, uint dim) {
   return 4 * block + 1 == dim;
 }
 
 /// active_masks [2 * coarse]  of macrocells.cl, of a volume's only level
-/// Out     listed_masks [2 * coarse]: a bit for each block that is listed; counts [coarse]: how
-/// many
-///         bits a macrocell has
+/// Out     listed_masks [2 * coarse]: a bit for each block that is listed; counts [coarse]: the
+///         number of bits of a macrocell
 /// Launch  grid-stride over coarse macrocells
 kernel void active_masks(const FrameParams frame_params, uint num_coarse,
                          global const uint *active_masks, global uint *listed_masks,
@@ -45,7 +44,7 @@ kernel void active_masks(const FrameParams frame_params, uint num_coarse,
       if (bx >= grid.blocks_x || by >= grid.blocks_y || bz >= grid.blocks_z) continue;
       const uint one_x = is_one_layer(bx, grid.dims_x), one_y = is_one_layer(by, grid.dims_y),
                  one_z = is_one_layer(bz, grid.dims_z);
-      /* Whose cells have its edges: the block before it along these axes. */
+      /* Its edges belong to cells of the block before it along these axes. */
       if ((one_x | one_y | one_z) != 0 &&
           mask_bit(frame, active_masks, bx - one_x, by - one_y, bz - one_z) != 0)
         words[bit >> 5] |= 1u << (bit & 31);

@@ -15,8 +15,7 @@
 /// round       0..num_rounds: the rays to make; num_rounds: none
 /// In      hits [pixel]: of the frame; given [pixel], given_hits [pixel]: the rays of the round
 ///         before, and what they met
-/// Out     open_counts [pixel]: rays of the rounds before that met nothing, 0 where there is no
-/// hit;
+/// Out     open_counts [pixel]: rays of the rounds before that met nothing, 0 without a hit;
 ///         given [pixel]
 /// Launch  grid-stride over pixels
 kernel void ambient(const FrameParams frame_params, global const FrameParams *frames,

@@ -6,8 +6,8 @@
 ///
 /// A pass: cache_request, or march (stamp what is cached, list what is not) -> where free slots may
 /// not suffice: cache_rank -> cache_select (how many, which) -> cache_evict -> cache_rebuild ->
-/// then cache_assign. All cost O(slots) or O(requests), never O(blocks). Which block gets which
-/// slot is left to chance; no hit depends on it.
+/// then cache_assign. All cost O(slots) or O(requests), never O(blocks). The slot that a block
+/// gets is left to chance; no hit depends on it.
 ///
 /// Progress is certain: the first block of the first active ray is served before all others. If old
 /// slots are too few even for it, slots that other rays use in this very pass are taken; those rays

@@ -11,6 +11,103 @@
 #include "device/ray_source.h"
 #include "device/work_group.h"
 
+/// A ray as one of its work-items sees it. A ray has `lanes` work-items, and each has a lane: it
+/// walks the round's blocks at places lane, lane + lanes, ...
+typedef struct RayMarch {
+  RayEntry entry;
+  RayStand stand;
+  uint lane, lanes;
+  uint next;           ///< the block that the next round begins with; ISO_INVALID_ID: none is left
+  local uint *blocks;  ///< [num_blocks] of the round, ISO_GROUP_SIZE apart
+  uint num_blocks;
+  uint num_passed;               ///< blocks of this lane in which nothing happened
+  int result;                    ///< ISO_RAY_*: what happened in this lane ...
+  uint waits_at, place;          ///< ... in this block, at this place of the round
+  volatile local uint *decides;  ///< the first such place of all lanes, or ISO_INVALID_ID
+  BlockChange change;
+  int goes_on;  ///< there is another round
+  int is_gone;  ///< nothing has happened, and no block is left
+} RayMarch;
+
+ISO_INLINE RayMarch begin_march(global const uint *active_ray_ids, global const uint *ray_block_ids,
+                                uint num_rays, uint i, uint lane, uint lanes) {
+  const int is_ray = i < num_rays;
+  RayMarch m;
+  m.entry = unpack_entry(is_ray ? active_ray_ids[i] : 0);
+  m.stand = read_stand(is_ray ? ray_block_ids[m.entry.pixel] : ISO_INVALID_ID);
+  m.lane = lane;
+  m.lanes = lanes;
+  m.next = m.stand.block_id;
+  m.waits_at = m.place = 0;
+  m.result = ISO_RAY_LEFT;
+  m.goes_on = is_ray;
+  m.is_gone = 0;
+  return m;
+}
+
+/// Finds the blocks of a round.
+ISO_INLINE void find_round(const FrameParams *level, global const uint *macrocell_masks,
+                           const Ray *ray, LastPlanes last, int is_first, RayMarch *m) {
+  if (is_first && m->lanes == 1) { /* most rays of a cold frame wait right there */
+    m->blocks[0] = m->next;
+    m->num_blocks = 1;
+    m->next = block_behind(level, ray, block_coords(level, m->next), last);
+  } else {
+    m->num_blocks =
+        find_blocks_from(level, macrocell_masks, ray, is_first ? m->stand.side : ISO_SIDE_UNKNOWN,
+                         &m->next, ISO_BLOCKS_AT_ONCE, m->blocks);
+  }
+}
+
+/// Walks this lane's blocks of a round, up to the first in which something happens.
+ISO_INLINE void walk_round(const FrameParams *level, const CacheReader *cache, const Ray *ray,
+                           LastPlanes last, int is_first, RayMarch *m) {
+  for (uint at = m->lane; at < m->num_blocks && m->result == ISO_RAY_LEFT; at += m->lanes) {
+    const uint block_id = m->blocks[at * ISO_GROUP_SIZE];
+    const int stands_here = is_first && at == 0;
+    const int may_end = m->next == ISO_INVALID_ID && at + 1 == m->num_blocks;
+    m->result = march_block(level, cache, ray, last, block_coords(level, block_id),
+                            stands_here && m->entry.in_doubt != 0,
+                            stands_here ? m->stand.side : ISO_SIDE_UNKNOWN, may_end, &m->change);
+    if (m->result == ISO_RAY_LEFT) {
+      ++m->num_passed;
+    } else {
+      atomic_min(m->decides, at);
+      m->place = at;
+      m->waits_at = block_id;
+    }
+  }
+}
+
+/// Ends a round that all lanes have walked: the first place where something happens decides, and
+/// what other lanes found is void. Returns how many blocks of this lane are before that place.
+ISO_INLINE uint decide_round(RayMarch *m) {
+  const uint place = *m->decides;
+  if (m->place != place) m->result = ISO_RAY_LEFT;
+  m->goes_on = place == ISO_INVALID_ID && m->next != ISO_INVALID_ID;
+  m->is_gone = place == ISO_INVALID_ID && m->next == ISO_INVALID_ID;
+  return m->lane < place ? min(m->num_passed, (place - m->lane - 1) / m->lanes + 1) : 0;
+}
+
+/// Stores where a ray that has no more rounds waits, if it does.
+///
+/// behind   the block behind the border of its band, or ISO_INVALID_ID
+/// Returns  whether the ray waits; *entry: for the list of those that do
+ISO_INLINE int leave(const RayMarch *m, uint behind, global uint *ray_block_ids, uint *entry) {
+  const int crosses = behind != ISO_INVALID_ID,
+            waits = m->result == ISO_RAY_DOUBT || m->result == ISO_RAY_WAITS;
+  uint log_ahead = m->entry.log_ahead;
+  if (crosses) {
+    log_ahead = ISO_BORDER_LOG_AHEAD;
+    ray_block_ids[m->entry.pixel] = behind;
+  } else if (waits && m->waits_at != m->stand.block_id) {
+    log_ahead = further_ahead(log_ahead);
+    ray_block_ids[m->entry.pixel] = m->waits_at;
+  }
+  *entry = pack_entry(m->entry.pixel, log_ahead, m->result == ISO_RAY_DOUBT ? 1u : 0u);
+  return waits || crosses;
+}
+
 /// Walks rays on until they hit, leave or wait. A ray that leaves the band of its level waits
 /// behind the border.
 ///
@@ -35,12 +132,19 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
     global uint *next_active_ray_ids, global uint *ray_block_ids, global HitRecord *hits,
     global uint *slot_stamps, global CacheState *cache) {
   const FrameParams *frame = &frame_params;
-  local uint slots[8 * ISO_GROUP_SIZE], found[ISO_BLOCKS_AT_ONCE * ISO_GROUP_SIZE];
+  local uint slots[8 * ISO_GROUP_SIZE], blocks[ISO_BLOCKS_AT_ONCE * ISO_GROUP_SIZE];
   local uint counters[2], group_hits, group_blocks, num_going;
-  volatile local uint deciding[ISO_GROUP_SIZE]; /* of each ray's blocks of the round */
+  volatile local uint decides[ISO_GROUP_SIZE];
   const uint item = get_local_id(0), num_rays = prev->next_active_count;
   const uint lanes = lanes_per_ray(num_rays);
-  const uint stamp = read_stamp(counts->pass);
+  const CacheReader reader = {
+      .table = table,
+      .inside = inside,
+      .values = cache_values,
+      .slot_stamps = slot_stamps,
+      .stamp = read_stamp(counts->pass),
+      .slots = slots + item,
+  };
   uint num_hits = 0, num_blocks = 0;
   if (get_global_id(0) == 0) {
     open_march(frame, prev, counts, next_counts, cache);
@@ -50,85 +154,46 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
   barrier(CLK_LOCAL_MEM_FENCE);
   for (uint begin = get_global_id(0) - item; begin < num_rays * lanes;
        begin += parts * get_global_size(0)) {
-    const uint i = (begin + item) / lanes, lane = item % lanes;
-    const int is_ray = i < num_rays;
-    const RayEntry entry = unpack_entry(is_ray ? active_ray_ids[i] : 0);
-    const uint pixel = entry.pixel;
-    const RayStand stand = read_stand(is_ray ? ray_block_ids[pixel] : ISO_INVALID_ID);
-    const uint from = stand.block_id;
-    ISO_FRAME_OF(level, from);
+    RayMarch m = begin_march(active_ray_ids, ray_block_ids, num_rays, (begin + item) / lanes,
+                             item % lanes, lanes);
+    const uint pixel = m.entry.pixel;
+    ISO_FRAME_OF(level, m.stand.block_id);
     const LastPlanes last = last_planes(level);
     const Ray ray = ray_of(level, given, pixel);
-    uint next = from, at = lane, more = 1, waits_at = 0, decides_at = 0;
-    int result = ISO_RAY_LEFT, going = is_ray, gone = 0, first = 1;
-    BlockChange change;
-    while (more != 0) {
-      uint num_passed = 0;
-      if (lane == 0) deciding[item / lanes] = ISO_INVALID_ID;
+    m.blocks = blocks + item;
+    m.decides = decides + item / lanes;
+    for (int is_first = 1, more = 1; more != 0; is_first = 0) {
+      m.num_passed = 0;
+      if (m.lane == 0) *m.decides = ISO_INVALID_ID;
       if (item == 0) num_going = 0;
       barrier(CLK_LOCAL_MEM_FENCE);
-      if (going) {
-        uint num_found = 1;
-        if (first && lanes == 1) { /* most rays of a cold frame wait right there */
-          found[item] = from;
-          next = block_behind(level, &ray, block_coords(level, from), last);
-        } else {
-          num_found =
-              find_blocks_from(level, macrocell_masks, &ray, first ? stand.side : ISO_SIDE_UNKNOWN,
-                               &next, ISO_BLOCKS_AT_ONCE, found + item);
-        }
-        for (at = lane; at < num_found && result == ISO_RAY_LEFT; at += lanes) {
-          const int stands_here = first && at == 0;
-          const int may_end = next == ISO_INVALID_ID && at + 1 == num_found;
-          result = march_block(level, table, inside, cache_values, &ray,
-                               block_coords(level, found[at * ISO_GROUP_SIZE + item]), last,
-                               slots + item, slot_stamps, stamp, stands_here && entry.in_doubt != 0,
-                               stands_here ? stand.side : ISO_SIDE_UNKNOWN, may_end, &change);
-          if (result == ISO_RAY_LEFT) {
-            ++num_passed;
-          } else {
-            atomic_min(&deciding[item / lanes], at);
-            decides_at = at;
-            waits_at = found[at * ISO_GROUP_SIZE + item];
-          }
-        }
+      if (m.goes_on) {
+        find_round(level, macrocell_masks, &ray, last, is_first, &m);
+        walk_round(level, &reader, &ray, last, is_first, &m);
       }
       barrier(CLK_LOCAL_MEM_FENCE);
-      if (going) {
-        const uint place = deciding[item / lanes];
-        if (lane < place) num_blocks += min(num_passed, (place - lane - 1) / lanes + 1);
-        if (decides_at != place) result = ISO_RAY_LEFT;
-        going = place == ISO_INVALID_ID && next != ISO_INVALID_ID;
-        gone = place == ISO_INVALID_ID && next == ISO_INVALID_ID;
-        if (going) atomic_inc(&num_going);
+      if (m.goes_on) {
+        num_blocks += decide_round(&m);
+        if (m.goes_on) atomic_inc(&num_going);
       }
-      first = 0;
       barrier(CLK_LOCAL_MEM_FENCE |
               CLK_GLOBAL_MEM_FENCE); /* all know where their ray stood: one may say where it is */
-      more = num_going;
+      more = num_going != 0;
       barrier(CLK_LOCAL_MEM_FENCE);
     }
-    if (result == ISO_RAY_HIT) {
-      hits[pixel] = hit_of(level, &ray, &change);
+    if (m.result == ISO_RAY_HIT) {
+      hits[pixel] = hit_of(level, &ray, &m.change);
       ++num_hits;
       ++num_blocks;
     }
-    int waits = result == ISO_RAY_DOUBT || result == ISO_RAY_WAITS;
-    uint log_ahead = entry.log_ahead;
-    if (waits && waits_at != from) {
-      log_ahead = further_ahead(log_ahead);
-      ray_block_ids[pixel] = waits_at;
+    uint behind = ISO_INVALID_ID, entry;
+    if (leaves_band(m.result, m.is_gone && m.lane == 0)) {
+      behind = cross_borders(frames, num_frames, macrocell_masks, ranges, no_data, no_data_begin,
+                             pixel, level_of(frames, num_frames, m.stand.block_id),
+                             leaves_on(m.result), m.blocks);
     }
-    if (leaves_band(result, gone && lane == 0)) {
-      const uint behind =
-          cross_borders(frames, num_frames, macrocell_masks, ranges, no_data, no_data_begin, pixel,
-                        level_of(frames, num_frames, from), leaves_on(result), found + item);
-      waits = behind != ISO_INVALID_ID;
-      if (waits) ray_block_ids[pixel] = behind;
-      log_ahead = ISO_BORDER_LOG_AHEAD;
-    }
-    append_entry(waits, pack_entry(pixel, log_ahead, result == ISO_RAY_DOUBT ? 1u : 0u), counters,
-                 &counts->next_active_count, next_active_ray_ids);
+    const int waits = leave(&m, behind, ray_block_ids, &entry);
+    append_entry(waits, entry, counters, &counts->next_active_count, next_active_ray_ids);
   }
   if (num_hits != 0) atomic_add(&group_hits, num_hits);
   if (num_blocks != 0) atomic_add(&group_blocks, num_blocks);

@@ -27,7 +27,7 @@
 #define ISO_TILE_PACKETS (ISO_TILE_COLUMNS * ISO_TILE_ROWS / ISO_LANES)
 #define ISO_LIST_PACKETS 32u
 
-/// What has become of the rays of a packet.
+/// The progress of the rays of a packet.
 typedef struct PacketProgress {
   Mask met;         ///< have come to an active block
   Mask moved;       ///< to a second one
@@ -268,6 +268,25 @@ ISO_INLINE void resume(Packet *p, const PacketScene *scene, PacketSource source,
   begin_at_blocks(p, scene, at, source.lanes);
 }
 
+/// Walks the rays of a packet on, from their beginning or from where they wait.
+///
+/// begins  1: the first pass of a frame
+/// Out     p->found, p->waits
+ISO_INLINE void march_packet(Packet *p, const PacketScene *scene, PacketSource source, uint begins,
+                             global const uint *ray_block_ids) {
+  Mask lanes = begins != 0 ? on_screen(scene->frame->screen, source) : source.lanes;
+  if (!any(lanes)) return;
+  make_packet_axes(scene->frame, source.column, source.row, p->rays.axis);
+  if (begins != 0) lanes &= enter_box(&p->rays, scene);
+  if (!any(lanes)) return;
+  open_packet(p, scene);
+  if (begins != 0)
+    begin_at_box(p, scene, lanes);
+  else
+    resume(p, scene, source, ray_block_ids);
+  walk_packet(p, scene);
+}
+
 /// Lists the rays that wait, and where.
 ISO_INLINE void list_waiting(const Packet *p, const FrameParams *frame, PacketSource source,
                              Mask moved, volatile global uint *count, global uint *list,
@@ -282,6 +301,13 @@ ISO_INLINE void list_waiting(const Packet *p, const FrameParams *frame, PacketSo
     list[place] = pack_entry(pixel, moved[lane] != 0 ? further_ahead(log_ahead) : log_ahead, 0);
     ++place;
   }
+}
+
+/// The picture's tiles, or as many packets of the list at a time.
+ISO_INLINE uint count_chunks(const View *view, uint begins, uint num_rays) {
+  return begins != 0
+             ? tiles_along(view->width, ISO_TILE_COLUMNS) * tiles_along(view->height, ISO_TILE_ROWS)
+             : tiles_along(num_rays, ISO_LANES * ISO_LIST_PACKETS);
 }
 
 /// Walks rays on until they hit, leave or wait: those of the picture, in the first pass of a frame,
@@ -306,73 +332,57 @@ kernel __attribute__((reqd_work_group_size(1, 1, 1))) void march_packets(
     global uint *slot_block_ids, global uint *slot_stamps, global uint *requested_bits,
     global const uint *free_slots, global CacheState *cache) {
   const FrameParams *frame = &frame_params;
-  local uint scratch[8 * ISO_GROUP_SIZE];
+  local uint slots[8 * ISO_GROUP_SIZE];
   OpenedBlock opened[ISO_OPENED_BLOCKS];
   const uint num_rays = prev->next_active_count, stamp = read_stamp(counts->pass),
-             chunk_packets = begins != 0 ? ISO_TILE_PACKETS : ISO_LIST_PACKETS;
-  const uint num_chunks = begins != 0 ? tiles_along(frame->view.width, ISO_TILE_COLUMNS) *
-                                            tiles_along(frame->view.height, ISO_TILE_ROWS)
-                                      : tiles_along(num_rays, ISO_LANES * ISO_LIST_PACKETS);
-  BlockMaker maker = {part_0,
-                      part_1,
-                      part_2,
-                      part_3,
-                      index,
-                      layout,
-                      frame_params.surface.isovalue,
-                      table,
-                      cache_values,
-                      inside,
-                      slot_block_ids,
-                      slot_stamps,
-                      requested_bits,
-                      free_slots,
-                      cache,
-                      stamp,
-                      0,
-                      0};
+             num_chunks = count_chunks(&frame->view, begins, num_rays);
+  BlockMaker maker = {
+      .part_0 = part_0,
+      .part_1 = part_1,
+      .part_2 = part_2,
+      .part_3 = part_3,
+      .index = index,
+      .layout = layout,
+      .isovalue = frame_params.surface.isovalue,
+      .table = table,
+      .values = cache_values,
+      .inside = inside,
+      .slot_block_ids = slot_block_ids,
+      .slot_stamps = slot_stamps,
+      .requested_bits = requested_bits,
+      .free_slots = free_slots,
+      .cache = cache,
+      .stamp = stamp,
+  };
+  PacketProgress progress = {.num_blocks = 0};
+  const PacketField field = {
+      .macrocell_masks = macrocell_masks,
+      .cache = {.table = table,
+                .inside = inside,
+                .values = cache_values,
+                .slot_stamps = slot_stamps,
+                .stamp = stamp,
+                .slots = slots},
+      .opened = opened,
+      .progress = &progress,
+      .maker = &maker,
+  };
   uint num_met = 0, num_hits = 0;
-  PacketProgress progress;
-  PacketField field;
   PacketScene scene;
-  progress.num_blocks = 0;
-  progress.opened = progress.have = progress.lost = ints(0);
-  field.macrocell_masks = macrocell_masks;
-  field.cache.table = table;
-  field.cache.inside = inside;
-  field.cache.values = cache_values;
-  field.cache.slot_stamps = slot_stamps;
-  field.cache.stamp = stamp;
-  field.cache.scratch = scratch;
-  field.opened = opened;
-  field.progress = &progress;
-  field.maker = &maker;
   for (uint i = 0; i < ISO_OPENED_BLOCKS; ++i) opened[i].block_id = ISO_INVALID_ID;
   for (uint i = 0; i < ISO_BRICK_VOXELS; ++i) opened[0].voxels[i] = 0; /* read by idle lanes */
   const int is_active_somewhere = make_packet_scene(frame, &field, &scene);
   for (uint chunk = get_group_id(0); chunk < num_chunks; chunk += get_num_groups(0)) {
     if (begins != 0) clear_hits(&frame->view, chunk, hits);
-    for (uint packet = 0; packet < chunk_packets; ++packet) {
+    for (uint packet = 0; packet < (begins != 0 ? ISO_TILE_PACKETS : ISO_LIST_PACKETS); ++packet) {
       const PacketSource source = begins != 0
                                       ? picture_packet(&frame->view, chunk, packet)
                                       : listed_packet(&frame->view, active_ray_ids, num_rays,
                                                       ISO_LIST_PACKETS * chunk + packet);
       Packet p;
-      Mask lanes = begins != 0 ? on_screen(frame->screen, source) : source.lanes;
       progress.met = progress.moved = ints(0);
       p.waits = p.found.lanes = ints(0);
-      if (is_active_somewhere && any(lanes)) {
-        make_packet_axes(frame, source.column, source.row, p.rays.axis);
-        if (begins != 0) lanes &= enter_box(&p.rays, &scene);
-        if (any(lanes)) {
-          open_packet(&p, &scene);
-          if (begins != 0)
-            begin_at_box(&p, &scene, lanes);
-          else
-            resume(&p, &scene, source, ray_block_ids);
-          walk_packet(&p, &scene);
-        }
-      }
+      if (is_active_somewhere) march_packet(&p, &scene, source, begins, ray_block_ids);
       if (any(p.found.lanes)) write_hits(&p, &scene, source.ray_ids, ISO_ROOT_STEPS, hits);
       if (any(p.waits)) {
         list_waiting(&p, frame, source, progress.moved, &counts->next_active_count,

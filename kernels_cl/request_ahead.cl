@@ -40,8 +40,8 @@ ISO_INLINE uint existing_corners(const FrameParams *frame, BlockCoords b) {
          (b.z + 1 < frame->grid.blocks_z ? 0xFFu : 0x0Fu);
 }
 
-/// Of the rays that wait, the first counts->window_count ask for the blocks that they touch in
-/// their next active blocks: N_Spec of them (Sec. 4), or, with
+/// Requests blocks: the first counts->window_count rays that wait ask for the blocks that they
+/// touch in their next active blocks: N_Spec of them (Sec. 4), or, with
 /// frame->schedule.per_ray_speculation, a number of their own.
 ///
 /// In      active_ray_ids [counts->next_active_count]; the other arguments as in march
@@ -65,7 +65,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_
   const uint lanes = lanes_per_ray(num_rays);
   const uint stamp = needed_stamp(counts->pass);
   const uint spec_count = speculation_count(frame, num_waiting);
-  /* Where rays are few, all look further: the last ones take fewer passes, and decode hardly more.
+  /* If rays are few, all look further: the last ones take fewer passes, and decode hardly more.
      With the number of those that wait, which is fewer, decoding takes longer than the passes that
      it saves. */
   const uint least = speculation_count(frame, counts->active_count) / 2;

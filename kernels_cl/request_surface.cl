@@ -33,7 +33,7 @@ kernel void request_surface(const FrameParams frame_params, uint begin, uint end
   const uint pass = counts->pass;
   if (get_global_id(0) == 0) {
     open_requests(cache);
-    cache->first_block_id = ISO_INVALID_ID; /* whoever asks for too many asks again for fewer */
+    cache->first_block_id = ISO_INVALID_ID; /* if these are too many, the host asks for fewer */
     cache->first_touched = 0;
   }
   for (uint i = begin + get_global_id(0); i < end; i += get_global_size(0)) {

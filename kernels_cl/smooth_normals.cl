@@ -42,7 +42,8 @@ ISO_INLINE uint find_slots(const FrameParams *frame, global const BlockEntry *ta
   return have;
 }
 
-/// Where a stencil's voxels are: in slots [8] of the blocks from `base` on, ISO_GROUP_SIZE apart.
+/// The voxels of a stencil in the cache: in slots [8] of the blocks from `base` on, ISO_GROUP_SIZE
+/// apart.
 typedef struct CachedStencil {
   global const float *values;
   local const uint *slots;

@@ -1,6 +1,7 @@
 // noise_field.cl against the host's rows of the same fields.
 
 #include "core/sources/noise_field.hpp"
+#include "core/sources/noise_on_device.hpp"
 
 #include <gtest/gtest.h>
 
@@ -97,7 +98,7 @@ TEST_P(NoiseFieldOnDevice, ReadersGiveTheSameVoxels) {
   options.type = VoxelType::kUint8;
   std::vector<float> by_host(33 * 30 * 21), by_device(by_host.size());
   open_generated(options)->read_layers(0, 21, by_host);
-  options.device = GetParam();
+  options.noise = noise_on(GetParam());
   open_generated(options)->read_layers(0, 21, by_device);
   EXPECT_EQ(by_host, by_device);
 }

@@ -45,8 +45,9 @@ if ! unshare --mount true 2> /dev/null; then
   exit 0
 fi
 rm -rf "$work/fresh"
-/usr/bin/python3 -m venv "$work/fresh"
-quietly "$work/fresh/bin/python" -m pip install --quiet --no-compile "$wheel[cpu]"
+/usr/bin/python3 -m venv --without-pip "$work/fresh"
+quietly "$python" -m pip --python "$work/fresh/bin/python" install --quiet --no-compile \
+  "$wheel[cpu]"
 loader=$(ldconfig -p | sed -n 's/.*libOpenCL.so.1 .*=> //p' | head -1)
 cat > "$work/picture.py" << 'END'
 import sys

@@ -105,12 +105,6 @@ RendererOptions with_choices(RendererOptions options, const CompressedVolume &vo
   return options;
 }
 
-FrameRequest with_detail(FrameRequest request, const Detail &detail) {
-  request.voxel_pixels = detail.voxel_pixels;
-  request.voxel_error = detail.voxel_error;
-  return request;
-}
-
 DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, double rate,
                            const FrameRequest &request, double max_surface_error) {
   check_max_surface_error(max_surface_error);

@@ -47,7 +47,4 @@ inline DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &vo
   return choose_detail(renderer, volume, volume.rate(), request, max_surface_error);
 }
 
-/// The request with this detail.
-FrameRequest with_detail(FrameRequest request, const Detail &detail);
-
 }  // namespace isowave::core

@@ -9,11 +9,13 @@
 #include <vector>
 
 #include "core/api/device_implementation.hpp"
+#include "core/api/device_renderer.hpp"
 #include "core/api/guarded.hpp"
-#include "core/api/renderer_implementation.hpp"
 #include "core/api/volume_implementation.hpp"
 #include "core/bricks/ranks.hpp"
 #include "core/bricks/team_renderer.hpp"
+#include "core/sources/noise_on_device.hpp"
+#include "core/stages/zfp_encode.hpp"
 #include "isowave/version.hpp"
 
 namespace isowave {
@@ -93,7 +95,8 @@ void open(TeamHeld &held, const std::string &path, const Compression &compressio
     source.overrides = to_overrides(raw);
     held.device = std::make_unique<Device::Implementation>(
         core::choose_local_device(options.device, held.team.local_rank()), DeviceOptions{});
-    source.storage.device = &held.device->device;
+    source.storage.encoder = core::encoder_on(held.device->device);
+    source.storage.noise = core::noise_on(held.device->device.info());
   });
   core::agree_on(team, "request", text_of(options, source.storage));
   held.volume = core::open_together(team, source, [&](std::vector<core::VolumeInfo> &levels) {

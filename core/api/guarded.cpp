@@ -1,13 +1,14 @@
 #include "core/api/guarded.hpp"
 
-#include <CL/opencl.hpp>
 #include <filesystem>
 #include <new>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <system_error>
 
+#ifdef ISOWAVE_HAS_OPENCL
 #include "core/ocl/device.hpp"
+#endif
 
 namespace isowave::core {
 
@@ -39,9 +40,11 @@ std::string text_of_current_exception(std::string_view doing) {
     return fmt::format("out of memory: {} needs more than a program can have", doing);
   } catch (const nlohmann::json::exception &error) {
     return fmt::format("{} failed: JSON: {}", doing, text_of(error));
+#ifdef ISOWAVE_HAS_OPENCL
   } catch (const cl::Error &error) {
     return fmt::format("{} failed in OpenCL: {}: {}", doing, error.what(),
                        ocl::error_name(error.err()));
+#endif
   } catch (const std::system_error &error) {
     return fmt::format("{} failed: {}", doing, error.code().message());
   } catch (const std::exception &error) {

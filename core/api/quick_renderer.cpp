@@ -9,9 +9,9 @@
 #include <utility>
 
 #include "core/api/device_implementation.hpp"
+#include "core/api/device_renderer.hpp"
 #include "core/api/frame_parts.hpp"
 #include "core/api/guarded.hpp"
-#include "core/api/renderer_implementation.hpp"
 #include "core/api/volume_implementation.hpp"
 #include "core/base/error.hpp"
 #include "core/host/host_renderer.hpp"

@@ -4,16 +4,12 @@
 #include <mutex>
 #include <utility>
 
-#include "core/accuracy/bounded_renderer.hpp"
 #include "core/accuracy/certify.hpp"
-#include "core/api/device_implementation.hpp"
 #include "core/api/frame_parts.hpp"
 #include "core/api/guarded.hpp"
 #include "core/api/renderer_implementation.hpp"
 #include "core/api/volume_implementation.hpp"
-#include "core/frame/timed_renderer.hpp"
 #include "core/io/file_name.hpp"
-#include "core/render/device_renderer.hpp"
 #include "core/zfp/isovalue.hpp"
 
 namespace isowave {
@@ -42,28 +38,6 @@ class ProgressOf : public ProgressInTurns {
 };
 
 }  // namespace
-
-core::RendererOptions core_options(const RendererOptions &options, std::uint32_t num_levels) {
-  core::RendererOptions result;
-  result.size = core_size(options.largest);
-  result.memory_budget = options.memory_budget;
-  result.cache_slots = options.cache_blocks;
-  result.with_levels = options.with_levels && num_levels > 1;
-  result.with_bounds = options.with_bounds;
-  result.with_kept_picture = options.with_time_budget;
-  result.with_given_rays = options.with_rays;
-  return result;
-}
-
-std::unique_ptr<core::Renderer> with_choices(std::unique_ptr<core::Renderer> renderer,
-                                             const RendererOptions &options,
-                                             const core::CompressedVolume &volume, double rate) {
-  if (options.with_bounds)
-    renderer = std::make_unique<core::BoundedRenderer>(std::move(renderer), volume, rate);
-  if (options.with_time_budget)
-    renderer = std::make_unique<core::TimedRenderer>(std::move(renderer));
-  return renderer;
-}
 
 CoreImplementation::CoreImplementation(std::shared_ptr<const void> keep,
                                        const core::CompressedVolume &of, Turns &turns,
@@ -106,14 +80,17 @@ Frame CoreImplementation::draw(const FrameRequest &request) {
     wanted.max_surface_error.reset();
     if (team.rank() == 0) frame.detail = public_choice(*stats.detail);
   }
-  fetch(request, wanted, frame);
+  fetch(request, frame);
   frame.statistics.hits = renderer_->num_hits(stats);
+  if (request.want_bounds) {  // last, since it draws frames of its own
+    const std::vector<float> depth = request.want_depth ? frame.depth : renderer_->depth();
+    frame.bounds = core::certify(*renderer_, volume_, wanted, depth).bounds;
+  }
   return frame;
 }
 
-/// Gets what the request wants of the frame that was drawn.
-void CoreImplementation::fetch(const FrameRequest &request, const core::FrameRequest &drawn,
-                               Frame &frame) {
+/// Gets what the request wants of the frame that was drawn, except bounds.
+void CoreImplementation::fetch(const FrameRequest &request, Frame &frame) {
   if (request.want_picture)
     frame.picture = renderer_->shade(core_appearance(request.appearance)).pixels;
   if (request.want_normals || request.want_positions || request.want_hits) {
@@ -121,9 +98,6 @@ void CoreImplementation::fetch(const FrameRequest &request, const core::FrameReq
   } else if (request.want_depth) {
     frame.depth = renderer_->depth();
   }
-  if (!request.want_bounds) return;
-  const std::vector<float> depth = request.want_depth ? frame.depth : renderer_->depth();
-  frame.bounds = core::certify(*renderer_, volume_, drawn, depth).bounds;
 }
 
 Frame CoreImplementation::cast_rays(std::span<const Ray> rays, double isovalue, Normals normals) {
@@ -155,35 +129,6 @@ std::string CoreImplementation::isovalue_notice(double isovalue) const {
                  [&] { return core::isovalue_notice(volume_, isovalue); });
 }
 
-std::unique_ptr<Renderer::Implementation> make_device_implementation(
-    std::shared_ptr<Device> device, std::shared_ptr<const Volume> volume,
-    const RendererOptions &options, const std::function<void()> &before_kernel) {
-  if (!device || !volume) throw core::Error("a renderer needs a device and a volume");
-  Device::Implementation &on = device->implementation();
-  const core::CompressedVolume &compressed = volume->implementation().volume;
-  const std::lock_guard lock(on.mutex);
-  const KernelWatch watch(on.device, before_kernel);
-  std::unique_ptr<core::Renderer> renderer =
-      with_choices(std::make_unique<core::DeviceRenderer>(
-                       on.device, compressed, core_options(options, volume->num_levels())),
-                   options, compressed, compressed.rate());
-  auto result = std::make_unique<CoreImplementation>(
-      std::make_shared<std::pair<std::shared_ptr<Device>, std::shared_ptr<const Volume>>>(device,
-                                                                                          volume),
-      compressed, on.mutex, std::move(renderer));
-  result->device_info = on.info;
-  result->grid = volume->grid();
-  result->notices = volume->notices();
-  result->device = std::move(device);
-  result->volume = std::move(volume);
-  return result;
-}
-
-Renderer::Renderer(std::shared_ptr<Device> device, std::shared_ptr<const Volume> volume,
-                   const RendererOptions &options)
-    : implementation_(guarded("making a renderer", [&] {
-        return make_device_implementation(std::move(device), std::move(volume), options);
-      })) {}
 Renderer::Renderer(std::unique_ptr<Implementation> implementation)
     : implementation_(std::move(implementation)) {}
 

@@ -2,7 +2,6 @@
 // Private to core/api: what is behind isowave::Renderer.
 
 #include <atomic>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -11,8 +10,8 @@
 
 #include "core/api/turns.hpp"
 #include "core/frame/renderer.hpp"
-#include "core/render/renderer_options.hpp"
 #include "core/zfp/zfp_stream.hpp"
+#include "isowave/device.hpp"
 #include "isowave/renderer.hpp"
 
 namespace isowave {
@@ -59,7 +58,7 @@ class CoreImplementation : public Renderer::Implementation {
 
  private:
   Frame draw(const FrameRequest &request);
-  void fetch(const FrameRequest &request, const core::FrameRequest &drawn, Frame &frame);
+  void fetch(const FrameRequest &request, Frame &frame);
   /// For other threads, that may ask while a frame is drawn.
   void note_memory() { memory_bytes_ = renderer_->memory_bytes(); }
 
@@ -69,16 +68,5 @@ class CoreImplementation : public Renderer::Implementation {
   std::unique_ptr<core::Renderer> renderer_;
   std::atomic<std::uint64_t> memory_bytes_ = 0;
 };
-
-core::RendererOptions core_options(const RendererOptions &options, std::uint32_t num_levels);
-/// Around a renderer of a device, what the options ask for.
-std::unique_ptr<core::Renderer> with_choices(std::unique_ptr<core::Renderer> renderer,
-                                             const RendererOptions &options,
-                                             const core::CompressedVolume &volume, double rate);
-/// A renderer of a device. before_kernel: called before each kernel is compiled; what it throws is
-/// thrown here.
-std::unique_ptr<Renderer::Implementation> make_device_implementation(
-    std::shared_ptr<Device> device, std::shared_ptr<const Volume> volume,
-    const RendererOptions &options, const std::function<void()> &before_kernel = {});
 
 }  // namespace isowave

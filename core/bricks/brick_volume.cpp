@@ -130,11 +130,9 @@ CompressedVolume compress_brick(const OpenReader &open, std::string_view what,
   options.precision = find_precision(open, what, storage);
   options.measure_error = storage.measure_error;
   options.input = {storage.map_nan, storage.no_data, {}, storage.num_threads};
-  if (storage.device && !options.precision) options.encoder = encoder_on(*storage.device);
+  if (!options.precision) options.encoder = storage.encoder;
   CroppedReader reader(std::move(whole), info);
-  CompressedVolume volume = compress(reader, options);
-  if (storage.device) storage.device->timer().collect();  // they belong to no frame
-  return volume;
+  return compress(reader, options);
 }
 
 std::vector<VolumeInfo> read_levels(const std::string &path, const RawOverrides &overrides) {
@@ -155,7 +153,7 @@ CompressedVolume load_brick(const std::string &path, const RawOverrides &overrid
     set_spacing(volume, info.spacing);
     return volume;
   }
-  return compress_brick([&] { return open_any_volume(path, overrides, storage.device); }, path,
+  return compress_brick([&] { return open_any_volume(path, overrides, storage.noise); }, path,
                         storage, own);
 }
 

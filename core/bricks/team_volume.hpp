@@ -14,11 +14,12 @@
 
 namespace isowave::core {
 
-/// The volume to open, and how to cut it. All ranks give the same, except storage.device.
+/// The volume to open, and how to cut it. All ranks give the same, except what
+/// makes and encodes voxels.
 struct TeamVolumeSource {
   std::string path{};
   RawOverrides overrides{};
-  Storage storage{};  ///< how it is compressed, if it is not yet; its device is this rank's
+  Storage storage{};  ///< how it is compressed, if it is not yet; by this rank's device
   /// XxYxZ bricks along each axis; "active": bricks with the same number of surface blocks; empty:
   /// bricks of equal size.
   std::string bricks{};

@@ -60,4 +60,11 @@ inline FrameRequest within_ms(double time_budget_ms, FrameRequest request) {
   return request;
 }
 
+/// The request with this detail.
+inline FrameRequest with_detail(FrameRequest request, const Detail &detail) {
+  request.voxel_pixels = detail.voxel_pixels;
+  request.voxel_error = detail.voxel_error;
+  return request;
+}
+
 }  // namespace isowave::core

@@ -1,6 +1,6 @@
 #pragma once
-// Which triangles marching cubes makes of a cell, by the signs of its corners: a table that is made
-// from a rule, for kernels and their twin.
+// The triangles that marching cubes makes of a cell, by the signs of its corners: a table that is
+// made from a rule, for kernels and their twin.
 //
 // On each face, the surface runs around each group of neighbouring inside corners: where two inside
 // corners lie across from each other, it separates them. Both cells of a face see the same corners,

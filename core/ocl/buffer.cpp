@@ -19,7 +19,7 @@ double mebibytes(std::uint64_t bytes) {
   return static_cast<double>(bytes) / (1 << 20);
 }
 
-/// What a buffer's OpenCL call failed with, as the Error to throw.
+/// The Error to throw for a failed OpenCL call of a buffer.
 Error failure(const std::string &name, const char *action, const cl::Error &error) {
   return Error("cannot {} buffer '{}': {}: {}", action, name, error.what(),
                error_name(error.err()));
@@ -37,8 +37,8 @@ void enqueue_pattern(cl::CommandQueue &queue, const cl::Buffer &mem, const void 
   queue.enqueueFillBuffer(mem, value, offset, bytes, nullptr, event);
 }
 
-/// Oclgrind 21.10 takes filled memory for uninitialized and would report every read of it. What the
-/// host writes counts.
+/// Oclgrind 21.10 takes filled memory for uninitialized and would report every read of it. Memory
+/// that the host writes counts as initialized.
 void write_pattern(cl::CommandQueue &queue, const cl::Buffer &mem, const void *pattern,
                    std::size_t pattern_bytes, std::size_t bytes, std::size_t offset,
                    cl::Event *event) {

@@ -16,8 +16,8 @@ struct BufferSize {
   std::uint64_t element_bytes = 1;  ///< not 0
   std::uint64_t count = 0;          ///< elements
 
-  /// What the ledger books: at least 1 byte, since OpenCL has no empty buffers. 2^64 - 1, which no
-  /// device has, instead of an overflow.
+  /// The bytes that the ledger books: at least 1, since OpenCL has no empty buffers; 2^64 - 1,
+  /// which no device has, instead of an overflow.
   std::uint64_t bytes() const;
 };
 

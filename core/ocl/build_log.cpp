@@ -21,7 +21,7 @@ std::optional<std::size_t> take_number(std::string_view &text) {
   return number;
 }
 
-/// Of each line of the joined text, where it comes from: `file:line`.
+/// The origin of each line of the joined text: `file:line`.
 std::vector<std::string> places_of(std::string_view text) {
   constexpr std::string_view kMarker = "#line ";
   std::vector<std::string> places;

@@ -1,5 +1,5 @@
 #pragma once
-// What a device's compiler says of a kernel that does not build.
+// The message of a device's compiler about a kernel that does not build.
 
 #include <string>
 #include <string_view>

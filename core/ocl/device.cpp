@@ -61,7 +61,7 @@ std::string build_options(const DeviceInfo &device, Defines defines) {
   return options;
 }
 
-/// What OpenCL's embedded profile leaves out and kernels need, or nothing.
+/// Abilities that kernels need and OpenCL's embedded profile leaves out, or nothing.
 std::string lacking(const cl::Device &device, const Capabilities &can) {
   if (device.getInfo<CL_DEVICE_PROFILE>().starts_with("EMBEDDED_PROFILE") &&
       !has_word(device.getInfo<CL_DEVICE_EXTENSIONS>(), "cles_khr_int64"))

@@ -24,7 +24,7 @@ namespace isowave::core::ocl {
 enum class DeviceType { kCpu, kGpu, kAccelerator, kOther };
 std::string_view to_string(DeviceType type);
 
-/// What a device can do, probed when it is opened or listed. Optional features have tested
+/// The abilities of a device, probed when it is opened or listed. Optional features have tested
 /// fallbacks.
 struct Capabilities {
   bool int64_atomics = false;             ///< cl_khr_int64_base_atomics and extended
@@ -61,7 +61,7 @@ std::vector<DeviceInfo> list_devices();
 /// Throws  Error naming the devices there are
 DeviceInfo choose_device(std::string_view selector = "");
 /// The rule of choose_device() alone. `environment` stands for ISOWAVE_DEVICE and counts when
-/// `selector` is empty. Of several matches the first is taken. Returns a reference into `devices`.
+/// `selector` is empty. The first of several matches is taken. Returns a reference into `devices`.
 const DeviceInfo &pick_device(std::span<const DeviceInfo> devices, std::string_view selector,
                               std::string_view environment);
 

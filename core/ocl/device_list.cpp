@@ -1,4 +1,4 @@
-// Which devices there are, what they can do, and which one to take.
+// The devices that there are, what they can do, and which one to take.
 
 #include "core/ocl/device_list.hpp"
 

@@ -93,7 +93,7 @@ const std::array<Driver, kNumDrivers> &drivers() {
   return all;
 }
 
-/// What became of a driver's folder.
+/// A driver's folder, and what was found out about it.
 struct KernelFolder {
   std::string notice;   ///< which other folder it was given, and why
   std::string trouble;  ///< why it cannot write to its folder

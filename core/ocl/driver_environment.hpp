@@ -1,5 +1,5 @@
 #pragma once
-// What OpenCL drivers need of the environment. Drivers keep compiled kernels in a folder, and run
+// The environment that OpenCL drivers need. Drivers keep compiled kernels in a folder, and run
 // what they find there: no other user of the machine may be able to write to it.
 
 #include <filesystem>

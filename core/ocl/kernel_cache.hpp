@@ -1,6 +1,6 @@
 #pragma once
-// Where drivers keep the kernels that they have compiled, for the next program that asks for them.
-// isowave keeps none itself.
+// The folder where a driver keeps the kernels that it has compiled, for the next program that asks
+// for them. isowave keeps none itself.
 
 #include <filesystem>
 #include <optional>
@@ -11,12 +11,12 @@ namespace isowave::core::ocl {
 
 class KernelCache {
  public:
-  /// What is there from now on is new.
+  /// Kernels that come from now on are new.
   explicit KernelCache(const DeviceInfo &device);
 
-  /// Nothing where the driver keeps no kernels, or that is not known.
+  /// Nothing if the driver keeps no kernels, or its folder is not known.
   const std::optional<std::filesystem::path> &folder() const { return folder_; }
-  /// Whether kernels came to it since this was made, from whomever. Looks at every file.
+  /// Whether kernels came to the folder since this was made, from any program. Looks at every file.
   bool has_new_kernels() const;
 
  private:

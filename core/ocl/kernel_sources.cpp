@@ -15,7 +15,7 @@ std::string_view folder_of(std::string_view name) {
   return name.substr(0, name.find_last_of('/') + 1);
 }
 
-/// What a line `#include "x.h"` names; empty for any other line.
+/// The file that a line `#include "x.h"` names; empty for any other line.
 std::string_view included_by(std::string_view line) {
   constexpr std::string_view kBegin = "#include \"";
   if (!line.starts_with(kBegin)) return {};

@@ -14,8 +14,8 @@ class BlockTriangles {
   static ocl::BufferSizes sizes();
   explicit BlockTriangles(ocl::Device &device);
 
-  /// Entries of the list that a call is for: from `begin` to below `end`. What there is for each
-  /// entry of a list of counts begins with entry `first`.
+  /// Entries of the list that a call is for: from `begin` to below `end`. Lists that have a count
+  /// for each entry begin with entry `first`.
   struct Entries {
     std::uint32_t begin = 0, end = 0, first = 0;
   };

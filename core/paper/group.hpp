@@ -35,7 +35,7 @@ struct BlockGroups {
 
 class Group {
  public:
-  /// What the lengths of its buffers depend on.
+  /// Limits that the lengths of its buffers follow from.
   struct Limits {
     std::uint64_t num_rays = 0;   ///< bounds a pass's pairs
     std::uint32_t num_slots = 0;  ///< of the cache

@@ -13,7 +13,7 @@ namespace isowave::core {
 
 namespace {
 
-/// Of a part of a mesh at most.
+/// Triangles of a part of a mesh, at most.
 constexpr std::uint64_t kPartTriangles = 1u << 20;
 /// Kernels find a vertex by 32 bits.
 constexpr std::uint64_t kMostTriangles = std::numeric_limits<std::uint32_t>::max() / 3;

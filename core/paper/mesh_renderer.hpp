@@ -31,7 +31,7 @@ struct MeshRendererOptions {
   StreamPlace stream = StreamPlace::kAuto;  ///< where the compressed volume is
 };
 
-/// What a frame took.
+/// The cost of a frame.
 struct MeshFrameStats {
   bool is_new_surface = false;      ///< the blocks of the isovalue were found in this frame
   bool is_kept = false;             ///< the mesh stays on the device, for the next frame
@@ -81,7 +81,7 @@ class MeshRenderer {
   void clear_cache();
 
  private:
-  /// Of the surface at hand, on the device.
+  /// The surface at hand, on the device.
   struct Lists {
     Lists(ocl::Device &device, std::uint64_t num_listed);
     static ocl::BufferSizes sizes(std::uint64_t num_listed);

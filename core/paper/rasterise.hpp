@@ -9,7 +9,7 @@
 
 namespace isowave::core {
 
-/// What drawing triangles needs of a view.
+/// A view as triangles are drawn by it.
 RasterView make_raster_view(const View &view);
 
 class Rasterise {

@@ -17,7 +17,7 @@ namespace isowave::core {
 
 class Resident {
  public:
-  /// Of what stays beside the Macrocells.
+  /// The buffers that stay, beside those of the Macrocells.
   static ocl::BufferSizes sizes(std::uint64_t num_blocks, ImageSize size);
 
   /// Decodes the whole volume.

@@ -57,8 +57,7 @@ class GeneratedReader : public VolumeReader {
       : options_(options), rows_(make_field_rows(options.field, options.dims, options.seed)) {
     info_ = info_of(options);
     const auto noise = make_noise_field(options.field, options.dims, options.seed);
-    if (noise && options.device && NoiseOnDevice::suits(*options.device))
-      on_device_.emplace(device_.emplace(*options.device), *noise, options.dims, options.type);
+    if (noise && options.noise) made_ = options.noise(*noise, options.dims, options.type);
   }
 
   void read_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<float> out) override {
@@ -97,10 +96,10 @@ class GeneratedReader : public VolumeReader {
   template <class Consume>
   void for_rows(std::uint32_t z_begin, std::uint32_t num_layers, const Consume &consume) {
     const std::uint64_t num_rows = std::uint64_t(info_.dims.y) * num_layers;
-    if (on_device_) {
+    if (made_) {
       const std::size_t row_bytes = info_.dims.x * size_of(info_.type);
       stored_.resize(num_rows * row_bytes);
-      on_device_->evaluate(z_begin, num_layers, stored_);
+      made_->evaluate(z_begin, num_layers, stored_);
       return parallel_for(num_rows, options_.num_threads, [&](std::uint64_t row, std::uint32_t) {
         consume(row, std::span<const std::byte>(stored_).subspan(row * row_bytes, row_bytes));
       });
@@ -124,9 +123,8 @@ class GeneratedReader : public VolumeReader {
 
   GenerateOptions options_;
   std::unique_ptr<FieldRows> rows_;
-  std::optional<ocl::Device> device_{};  ///< of its own: layers are read beside other work on it
-  std::optional<NoiseOnDevice> on_device_{};
-  std::vector<std::byte> stored_{};  ///< layers that it made
+  std::unique_ptr<NoiseVoxels> made_{};  ///< null: the rows make the voxels
+  std::vector<std::byte> stored_{};      ///< layers of made_
 };
 
 /// The file to write: a folder gets the Open-SciVis name, and a name in that pattern must tell the

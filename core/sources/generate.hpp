@@ -31,14 +31,16 @@
 // operations only and are the same on every machine; the other three use the C library's sin and
 // cos.
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
+#include <glm/glm.hpp>
 #include <memory>
-#include <optional>
+#include <span>
 #include <string_view>
 #include <vector>
 
-#include "core/ocl/device.hpp"
 #include "core/volume/volume.hpp"
 #include "core/zfp/zfp_stream.hpp"
 
@@ -67,14 +69,26 @@ std::vector<std::string> field_names();
 /// Whether a seed makes another volume of it.
 bool has_seed(Field field);
 
+struct NoiseField;
+
+/// The voxels of a field of noise, made in place of the host's threads: the same bytes.
+class NoiseVoxels {
+ public:
+  virtual ~NoiseVoxels() = default;
+  /// The bytes of voxels [num_layers][ny][nx] from layer z_begin on.
+  virtual void evaluate(std::uint32_t z_begin, std::uint32_t num_layers,
+                        std::span<std::byte> voxels) = 0;
+};
+using NoiseMaker = std::function<std::unique_ptr<NoiseVoxels>(
+    const NoiseField &field, const glm::uvec3 &dims, VoxelType type)>;
+
 struct GenerateOptions {
   Field field = Field::kMixingLayer;
   glm::uvec3 dims{0};
   VoxelType type = VoxelType::kFloat32;
   std::uint64_t seed = 1;         ///< of fields of noise
   std::uint32_t num_threads = 0;  ///< 0: one per processor
-  /// Makes the voxels of fields of noise, if it has doubles and is no CPU; unset: the host does.
-  std::optional<ocl::DeviceInfo> device{};
+  NoiseMaker noise{};             ///< for fields of noise: noise_on() a device; none: the host
 };
 
 /// The volume as a reader, without a file: the voxels that generate_to_file() would write. Layers

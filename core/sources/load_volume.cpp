@@ -6,9 +6,6 @@
 #include "core/base/error.hpp"
 #include "core/base/text.hpp"
 #include "core/io/raw_reader.hpp"
-#include "core/ocl/device.hpp"
-#include "core/sources/generate.hpp"
-#include "core/stages/zfp_encode.hpp"
 #include "core/view/frame.hpp"
 #include "core/zfp/isovalue.hpp"
 #include "core/zfp/zfp_accuracy.hpp"
@@ -116,7 +113,7 @@ CompressOptions compress_options(const OpenReader &open, const VolumeInfo &info,
   options.measure_error = storage.measure_error;
   options.input = {storage.map_nan, storage.no_data, step(storage, "compressing"),
                    storage.num_threads};
-  if (storage.device && !options.precision) options.encoder = encoder_on(*storage.device);
+  if (!options.precision) options.encoder = storage.encoder;
   return options;
 }
 
@@ -127,7 +124,6 @@ CompressedVolume compress_volume(const OpenReader &open, std::string_view what,
   const std::unique_ptr<VolumeReader> reader = open();
   CompressedVolume volume =
       compress(*reader, compress_options(open, reader->info(), what, storage));
-  if (storage.device) storage.device->timer().collect();  // they belong to no frame
   if (const std::string notice = all_zero_notice(volume); !notice.empty())
     throw Error("{}: {}", what, notice);
   return volume;
@@ -164,12 +160,12 @@ CompressedVolume open_compressed_volume(const std::string &path, const RawOverri
 
 std::unique_ptr<VolumeReader> open_any_volume(const std::string &path,
                                               const RawOverrides &overrides,
-                                              const ocl::Device *maker) {
+                                              const NoiseMaker &noise) {
   if (!path.starts_with(kGenerate)) return open_volume(path, overrides);
   if (overrides.dims || overrides.type)
     throw Error("{}: it says dims and type itself: leave them out", path);
   GenerateOptions options = parse_generator(std::string_view(path).substr(kGenerate.size()));
-  if (maker != nullptr) options.device = maker->info();
+  options.noise = noise;
   std::unique_ptr<VolumeReader> reader = open_generated(options);
   if (!overrides.spacing) return reader;
   return std::make_unique<RespacedReader>(std::move(reader), *overrides.spacing);

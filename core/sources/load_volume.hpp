@@ -9,13 +9,10 @@
 #include <string_view>
 
 #include "core/io/open_volume.hpp"
+#include "core/sources/generate.hpp"
 #include "core/zfp/zfp_stream.hpp"
 
 namespace isowave::core {
-
-namespace ocl {
-class Device;
-}
 
 /// How voxels are compressed: by one of rate, tolerance, relative_tolerance and exact. By default
 /// they keep all that float32 holds of them: find_precision().
@@ -29,7 +26,8 @@ struct Storage {
   std::optional<float> map_nan{};              ///< see InputOptions
   std::optional<double> no_data{};             ///< see InputOptions
   std::uint32_t num_threads = 0;               ///< see InputOptions
-  ocl::Device *device = nullptr;               ///< encodes at a fixed rate
+  CoderMaker encoder{};                        ///< at a fixed rate: encoder_on() a device
+  NoiseMaker noise{};                          ///< of generators: noise_on() a device
   const VolumePart *part = nullptr;            ///< see InputOptions
   /// Makes the progress of each step, which it is told: "compressing".
   std::function<Progress(std::string_view step)> progress{};
@@ -49,7 +47,7 @@ using OpenReader = std::function<std::unique_ptr<VolumeReader>()>;
 /// Throws  Error, which names the volume `what`: see choose_precision()
 std::optional<BlockPrecision> find_precision(const OpenReader &open, std::string_view what,
                                              const Storage &storage);
-/// Compresses into memory. Clears the stage times of storage.device.
+/// Compresses into memory.
 ///
 /// Throws  Error also on what cannot be drawn
 CompressedVolume compress_volume(const OpenReader &open, std::string_view what,
@@ -72,9 +70,9 @@ CompressedVolume open_compressed_volume(const std::string &path, const RawOverri
 
 /// Opens a file (open_volume), or the generator that `generate:FIELD_XxYxZ_TYPE[:SEED]` names.
 ///
-/// maker  makes the generator's voxels, where it can (GenerateOptions::device)
+/// noise  see GenerateOptions
 std::unique_ptr<VolumeReader> open_any_volume(const std::string &path,
                                               const RawOverrides &overrides,
-                                              const ocl::Device *maker = nullptr);
+                                              const NoiseMaker &noise = {});
 
 }  // namespace isowave::core

@@ -11,9 +11,9 @@ namespace isowave::core {
 /// The fewest slots that still draw every picture: one dual grid.
 inline constexpr std::uint32_t kMinCacheSlots = 8;
 
-/// What the stages of one pass read of the cache, and add to its requests.
+/// The cache, as the stages of one pass read it, and its requests.
 struct BlockCache {
-  /// What the lengths of its buffers depend on.
+  /// Limits that the lengths of its buffers follow from.
   struct Limits {
     std::uint32_t num_slots = kMinCacheSlots;  ///< at least that many
     std::uint64_t num_rays = 0;                ///< bounds a pass's pairs
@@ -63,7 +63,7 @@ struct BlockCache {
   /// in_dual_grids  only what rays read is stamped, as march does, not all that it stands for
   /// Waits          no
   void count_touched(Wavefront &rays, bool in_dual_grids);
-  /// What was counted last.
+  /// The last count.
   ///
   /// Waits  yes
   std::uint32_t touched_blocks() const { return touched_.read().front(); }

@@ -1,7 +1,7 @@
 #pragma once
-// Which blocks may hold the isosurface (Sec. 3.1): value ranges of blocks and of coarse macrocells
-// of 4^3 blocks, built once per volume from decoded data, and one bit per block for the isovalue at
-// hand. See kernels_cl/macrocells.cl.
+// The blocks that may hold the isosurface (Sec. 3.1): value ranges of blocks and of coarse
+// macrocells of 4^3 blocks, built once per volume from decoded data, and one bit per block for the
+// isovalue at hand. See kernels_cl/macrocells.cl.
 
 #include <array>
 #include <glm/glm.hpp>
@@ -16,14 +16,14 @@
 
 namespace isowave::core {
 
-/// Of one level of detail or of several, one behind the other: LevelPlace::ranges_begin,
-/// masks_begin.
+/// Ranges and masks of one level of detail or of several, one behind the other:
+/// LevelPlace::ranges_begin, masks_begin.
 struct MacrocellBuffers {
-  /// What the lengths of its buffers depend on.
+  /// Limits that the lengths of its buffers follow from.
   struct Limits {
     std::uint64_t num_blocks = 0, num_macrocells = 0;  ///< of all levels together
-    /// Masks are kept of so many, for whoever draws the volume, and its lower and upper bound, by
-    /// turns.
+    /// Selections whose masks are kept: a renderer draws the volume, and its lower and upper bound,
+    /// by turns.
     std::size_t num_selections = 1;
     std::uint64_t no_data_words = 0;  ///< see joined_no_data() in core/view/detail.hpp
   };
@@ -69,7 +69,7 @@ class Macrocells {
   /// Waits        no
   void select(const FrameParams &frame, double voxel_error = 0,
               const DeviceStream *moved = nullptr);
-  /// What select() found: the surface of the frame that it was called with last.
+  /// The surface that select() found: that of the frame it was called with last.
   ///
   /// Waits  at the first call for an isovalue
   Surface surface(const FrameParams &frame);
@@ -108,7 +108,7 @@ class Macrocells {
     ocl::Kernel<kernels::macrocell_partials> &kernel;
   };
 
-  /// What masks are made of, and what belongs to them.
+  /// The values that masks are made of, and the masks' box.
   struct Selection {
     /// Isovalue, voxel_error, uniform and per-block offset of the layout; none: nothing yet.
     std::optional<std::array<double, 4>> of{};

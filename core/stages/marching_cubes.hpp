@@ -17,7 +17,7 @@ inline constexpr std::uint32_t kBlockVertices = 3 * ISO_BLOCK_VOXELS,
 /// Entries of the list that may be written at a time: MeshVertex::edge.
 inline constexpr std::uint32_t kMaxWrittenBlocks = 1u << (32 - ISO_VERTEX_BLOCK_SHIFT);
 
-/// What is known of the surface in each block of a list.
+/// Counts of the surface in each block of a list.
 struct SurfaceCounts {
   static ocl::BufferSizes sizes(std::uint64_t num_listed);
   SurfaceCounts(ocl::Device &device, std::uint64_t num_listed);

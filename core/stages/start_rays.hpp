@@ -20,8 +20,7 @@ class StartRays {
   /// macrocells  of any level of detail, since levels share what is used of them
   /// In          rays.counts: next_active_count is 0
   /// Out         rays.hits_of(source): none; next_active_ray_ids and ray_block_ids of the rays that
-  /// meet an
-  ///             active block; counts.next_active_count: how many they are
+  ///             meet an active block; counts.next_active_count: their number
   /// Waits       no
   void operator()(const Macrocells &macrocells, Wavefront &rays, bool begins_frame = true);
 

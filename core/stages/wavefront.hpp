@@ -9,7 +9,7 @@
 
 namespace isowave::core {
 
-/// Where the rays of pipeline `rays` come from.
+/// The source of the rays of pipeline `rays`.
 enum class RaySource {
   kCamera,
   kGiven  ///< Wavefront::given
@@ -22,7 +22,7 @@ inline ocl::Defines with_source(ocl::Defines defines, RaySource source) {
 }
 
 struct Wavefront {
-  /// What the lengths of its buffers depend on.
+  /// Limits that the lengths of its buffers follow from.
   struct Limits {
     std::uint64_t num_rays = 0;
     bool with_pairs = true;      ///< pipeline `blocks` needs the arrays of ray-block pairs
@@ -70,7 +70,7 @@ struct Wavefront {
     std::swap(previous_counts, counts);
   }
 
-  /// What the rays of a source hit.
+  /// The hits of the rays of a source.
   ocl::Buffer<HitRecord> &hits_of(RaySource source) {
     return source == RaySource::kGiven ? given_hits : hits;
   }

@@ -13,7 +13,7 @@ namespace isowave::core {
 
 class ZfpDecode {
  public:
-  /// Of one level of detail alone, and where streams are whole on the device, it has no buffers.
+  /// The buffers; none for one level of detail alone, or if streams are whole on the device.
   static ocl::BufferSizes sizes(std::uint64_t max_blocks, bool stream_on_host, bool levels);
   /// max_blocks      the most a call may decode
   /// stream_defines  DeviceStream::defines() of the streams to come

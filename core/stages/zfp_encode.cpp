@@ -180,7 +180,8 @@ class DeviceCoder : public LevelCoder {
  public:
   DeviceCoder(ocl::Device &device, const glm::uvec3 &dims, const CompressOptions &options,
               const PayloadSink &sink, bool keep)
-      : encoder_(device, dims, 64 * options.rate, options.measure_error, BlockErrors(keep)),
+      : device_(device),
+        encoder_(device, dims, 64 * options.rate, options.measure_error, BlockErrors(keep)),
         measure_error_(options.measure_error),
         sink_(sink) {}
 
@@ -191,6 +192,7 @@ class DeviceCoder : public LevelCoder {
 
   std::vector<float> finish(CompressedVolume &volume) override {
     encoder_.finish(sink_);
+    device_.timer().collect();  // the stage times belong to no frame
     if (measure_error_) volume.max_voxel_error = encoder_.errors().max();
     return encoder_.errors().take();
   }
@@ -198,6 +200,7 @@ class DeviceCoder : public LevelCoder {
   std::span<const float> decoded() const override { return {}; }
 
  private:
+  ocl::Device &device_;
   LayerEncoder encoder_;
   bool measure_error_;
   const PayloadSink &sink_;

@@ -75,11 +75,11 @@ class LayerEncoder {
   /// Hands the last piece to `sink`.
   void finish(const Sink &sink);
 
-  /// Of blocks that `sink` got; none unless measured.
+  /// The errors of the blocks that `sink` got; none unless measured.
   BlockErrors &errors() { return errors_; }
 
  private:
-  /// What the device sends back of a piece.
+  /// A piece as the device sends it back.
   struct Result {
     std::vector<uint> words;
     std::vector<float> errors;

@@ -10,9 +10,9 @@
 #include "portable/block_grid.h"
 #include "portable/grid_dda.h"
 
-/// That a ray looks for before it intersects them, or asks for them. Where many work-items take
-/// turns, a longer list is walked by more of them, and a last ray has up to as many; a CPU looks
-/// for more than it needs.
+/// Blocks that a ray finds before it intersects them, or asks for them. On a GPU, a longer list is
+/// walked by more work-items: a last ray has up to one for each block. A CPU would look for more
+/// blocks than it needs.
 #ifdef ISO_CPU
 #define ISO_BLOCKS_AT_ONCE 8u
 #else

@@ -6,8 +6,8 @@
 #include "portable/block_table.h"
 #include "portable/marching_cubes.h"
 
-/// Of the dual grid of block b: which voxels of its blocks are inside, corner x + 2y + 4z; 0 of
-/// those that there are not.
+/// The voxels that are inside, for each block of the dual grid of block b, corner x + 2y + 4z; 0
+/// for blocks that do not exist.
 ISO_INLINE void dual_grid_inside(const FrameParams *frame, global const BlockEntry *table,
                                  global const ulong *inside, BlockCoords b, ulong *bits) {
   for (uint corner = 0; corner < 8; ++corner) {

@@ -76,8 +76,8 @@ ISO_INLINE void transpose(const float8 *rows, float8 *columns) {
 }
 
 // Stores past the processor's caches, of what it will not read soon: it need not fetch what was
-// there before. `to` is a multiple of 32 bytes. Whoever has done so calls end_streams() before
-// others may read.
+// there before. `to` is a multiple of 32 bytes. A work-item that has done so calls end_streams()
+// before others may read.
 #if defined(__AVX__)
 #define stream_out(x, to) __builtin_nontemporal_store(x, to)
 #define end_streams() __builtin_ia32_sfence()

@@ -8,8 +8,8 @@
 #include "block_walk.h"
 #include "portable/no_data.h"
 
-/// Which of the levels of detail that draw a frame, frames [num_frames], the finest first, has the
-/// block with this id.
+/// The level of detail that has the block with this id, of those that draw a frame, frames
+/// [num_frames], the finest first.
 ISO_INLINE uint level_of(global const FrameParams *frames, uint num_frames, uint block_id) {
   const uint layer = block_id / (frames[0].place.blocks_x * frames[0].place.blocks_y);
   uint level = 0;
@@ -64,10 +64,10 @@ ISO_INLINE int lacks_data_at_border(const FrameParams *frame, global const uint 
   return 0;
 }
 
-/// Where a ray stands that leaves the band of frames[level], or ISO_INVALID_ID: there is nothing
-/// for it behind. Where the block behind the border is not as a whole on the ray's side, the ray
-/// stands there, with its side; else at the next active block, in this band or one behind. It has
-/// no side where data lack before the border or behind it.
+/// The place where a ray stands that leaves the band of frames[level], or ISO_INVALID_ID: there is
+/// nothing for it behind. If the block behind the border is not as a whole on the ray's side, the
+/// ray stands there, with its side; else at the next active block, in this band or one behind. It
+/// has no side if data lack before the border or behind it.
 ///
 /// side     on which it left; unknown: the border is in a block that is as a whole on one, or in a
 ///          cell without data

@@ -35,8 +35,8 @@ ISO_INLINE void tell_slot(local uint *to_slots, uint item, uint block_id, global
   if (ISO_LEVELS) to_slots[item] = block_id == ISO_INVALID_ID ? ISO_BLOCK_ABSENT : slots[request];
 }
 
-/// Where the block of item `block` goes, of the requests from `begin` on; ISO_BLOCK_ABSENT if it is
-/// of another level.
+/// The slot for the block of item `block`, of the requests from `begin` on; ISO_BLOCK_ABSENT if the
+/// block is of another level.
 ISO_INLINE uint told_slot(local const uint *to_slots, global const uint *slots, uint begin,
                           uint block) {
   return ISO_LEVELS ? to_slots[block] : slots[begin + block];

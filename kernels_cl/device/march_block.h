@@ -8,7 +8,17 @@
 #include "portable/block_table.h"
 #include "portable/cell_intersect.h"
 
-/// What became of a ray.
+/// The cache (block_cache.cl), as a work-item looks into it.
+typedef struct CacheReader {
+  global BlockEntry *table;
+  global const ulong *inside;
+  global const float *values;
+  global uint *slot_stamps;
+  uint stamp;         ///< read_stamp() of the pass: the stamp of every cached block that is opened
+  local uint *slots;  ///< scratch for the slots of a dual grid: 8, ISO_GROUP_SIZE apart
+} CacheReader;
+
+/// The end of a ray's way through a block.
 #define ISO_RAY_LEFT 0          ///< it left the block, or the volume
 #define ISO_RAY_HIT 1           ///< equal to what isolate() returns, as is
 #define ISO_RAY_DOUBT 2         ///< the next march settles it
@@ -53,8 +63,8 @@ ISO_INLINE ulong cells_of_corners(uint corners) {
 }
 
 #if ISO_ON_DEMAND
-/// What the table knows of the cells of block b. To be asked when its slot has been seen: what was
-/// read of the entry before that may be older (on_demand.h).
+/// The cells of block b that the table knows. To be called when the block's slot has been seen:
+/// parts of the entry that were read before the slot may be older (on_demand.h).
 ISO_INLINE ulong known_cells(const FrameParams *frame, global const BlockEntry *table,
                              BlockCoords b) {
   volatile global const BlockEntry *entry = &table[find_entry(frame, table, b.x, b.y, b.z)];
@@ -62,13 +72,14 @@ ISO_INLINE ulong known_cells(const FrameParams *frame, global const BlockEntry *
 }
 #endif
 
-/// Which cells of block b a ray must look into: those in which inside changes, and those that need
-/// a block that is not cached. What is found out stays in the block's table entry for the next who
-/// asks. Out: slots [8] of the dual grid, ISO_GROUP_SIZE apart; *have: which of its corners are
-/// cached, or beyond the volume, where no cell of the domain reaches.
-ISO_INLINE ulong open_block(const FrameParams *frame, global BlockEntry *table,
-                            global const ulong *inside, BlockCoords b, local uint *slots,
+/// The cells of block b that a ray must look into: those in which inside changes, and those that
+/// need a block that is not cached. The cells are kept in the block's table entry for the next ray.
+///
+/// Out  cache->slots; *have: which corners of the dual grid are cached, or beyond the volume, where
+///      no cell of the domain reaches
+ISO_INLINE ulong open_block(const FrameParams *frame, const CacheReader *cache, BlockCoords b,
                             uint *have) {
+  global BlockEntry *table = cache->table;
   BlockEntry entries[8];
   ulong cells;
   find_dual_grid(frame, table, b.x, b.y, b.z, entries);
@@ -77,7 +88,7 @@ ISO_INLINE ulong open_block(const FrameParams *frame, global BlockEntry *table,
           (b.z + 1 == frame->grid.blocks_z ? 0xF0u : 0u);
   ISO_UNROLL
   for (uint corner = 0; corner < 8; ++corner) {
-    slots[corner * ISO_GROUP_SIZE] = entries[corner].slot;
+    cache->slots[corner * ISO_GROUP_SIZE] = entries[corner].slot;
     *have |= (uint)(entries[corner].slot != ISO_BLOCK_ABSENT) << corner;
   }
   cells = (ulong)entries[0].changing_high << 32 | entries[0].changing_low;
@@ -88,7 +99,8 @@ ISO_INLINE ulong open_block(const FrameParams *frame, global BlockEntry *table,
     ulong voxels[8];
     ISO_UNROLL
     for (uint corner = 0; corner < 8; ++corner) {
-      voxels[corner] = entries[corner].slot == ISO_BLOCK_ABSENT ? 0 : inside[entries[corner].slot];
+      const uint slot = entries[corner].slot;
+      voxels[corner] = slot == ISO_BLOCK_ABSENT ? 0 : cache->inside[slot];
     }
     cells = changing_cells(voxels) | cells_of_corners(~*have & 0xFFu);
     if (!ISO_CHECK_RACES && *have == 0xFFu) {
@@ -100,22 +112,27 @@ ISO_INLINE ulong open_block(const FrameParams *frame, global BlockEntry *table,
   return cells;
 }
 
-/// Walks the cells of block b. Returns ISO_RAY_LEFT (the block), ISO_RAY_HIT, ISO_RAY_DOUBT,
-/// ISO_RAY_WAITS where a block of the dual grid is not cached, or how its band ends. slots: this
-/// work-item's place for eight, ISO_GROUP_SIZE apart. If b is cached, its slot's stamp becomes
-/// `stamp`. precise: settle doubts on the spot. side: where the ray was before the border at which
-/// its band begins in this block. may_end: its band may end in this one.
-ISO_INLINE int march_block(const FrameParams *frame, global BlockEntry *table,
-                           global const ulong *inside, global const float *cache_values,
-                           const Ray *ray, BlockCoords b, LastPlanes last, local uint *slots,
-                           global uint *slot_stamps, uint stamp, int precise, uint side,
-                           int may_end, BlockChange *found) {
+/// Stamps the block that was opened last, for all of its dual grid: last_use() in slot_stamps.h.
+ISO_INLINE void stamp_block(const CacheReader *cache) {
+  cache->slot_stamps[cache->slots[0]] = cache->stamp;
+}
+
+/// Walks the cells of block b, and stamps it if it is cached.
+///
+/// precise  doubts are settled on the spot
+/// side     where the ray was before the border at which its band begins in this block
+/// may_end  the ray's band may end in this block
+/// Returns  ISO_RAY_LEFT (the block), ISO_RAY_HIT, ISO_RAY_DOUBT, ISO_RAY_WAITS if a block of the
+///          dual grid is not cached, or how the ray's band ends
+ISO_INLINE int march_block(const FrameParams *frame, const CacheReader *cache, const Ray *ray,
+                           LastPlanes last, BlockCoords b, int precise, uint side, int may_end,
+                           BlockChange *found) {
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
   uint have; /* corners of the dual grid */
   int result = ISO_RAY_LEFT;
-  const ulong cells = open_block(frame, table, inside, b, slots, &have);
+  const ulong cells = open_block(frame, cache, b, &have);
   if ((have & 1u) == 0) return ISO_RAY_WAITS;
-  slot_stamps[slots[0]] = stamp; /* for all of the dual grid: see last_use() in block_cache.cl */
+  stamp_block(cache);
   const GridWalk block = walk_from(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
   const int ends = may_end && ends_band(frame, walk_exit(&block, ray));
   if (cells == 0 && !has_side(side) && !ends) return ISO_RAY_LEFT;
@@ -134,9 +151,10 @@ ISO_INLINE int march_block(const FrameParams *frame, global BlockEntry *table,
       } else {
         for (int corner = 0; corner < 8; ++corner) {
           const int vx = x + (corner & 1), vy = y + (corner >> 1 & 1), vz = z + (corner >> 2);
-          const uint slot = slots[((vx >> 2) + 2 * (vy >> 2) + 4 * (vz >> 2)) * ISO_GROUP_SIZE];
-          found->w[corner] = cache_values[slot * ISO_BLOCK_VOXELS +
-                                          (uint)((vx & 3) + 4 * (vy & 3) + 16 * (vz & 3))] -
+          const uint slot =
+              cache->slots[((vx >> 2) + 2 * (vy >> 2) + 4 * (vz >> 2)) * ISO_GROUP_SIZE];
+          found->w[corner] = cache->values[slot * ISO_BLOCK_VOXELS +
+                                           (uint)((vx & 3) + 4 * (vy & 3) + 16 * (vz & 3))] -
                              frame->surface.isovalue;
         }
         if (has_side(side))

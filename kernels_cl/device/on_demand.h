@@ -2,17 +2,17 @@
 /// that is first at each. OpenCL C 1.2, on devices that keep more than that promises.
 ///
 /// When the kernel begins, cache->free_count slots are free and no block is marked in
-/// requested_bits. Here, a mark says that somebody decodes the block. That work-item takes the last
-/// free slot, fills it, enters it into the table, and takes the mark back. Others wait for that,
-/// but not for long: then their rays wait for the next pass, as do those for which there is no
-/// slot. So nothing depends on when other work-items run.
+/// requested_bits. Here, a mark says that a work-item decodes the block. That work-item takes the
+/// last free slot, fills it, enters it into the table, and takes the mark back. Others wait for
+/// that, but not for long: then their rays wait for the next pass, as do those for which there is
+/// no slot. So nothing depends on when other work-items run.
 ///
 /// Order of memory: a block's values, bits and stamp, and what its entry says of its cells, are
 /// written before an atomic_xchg gives the entry its slot. A reader of an entry looks at the slot
 /// first, and at all else when there is one. OpenCL 1.2 orders no memory between work-groups.
 /// PoCL does: its atomic functions are LLVM's with order acq_rel (seen in PoCL 3.1's library for
-/// x86), so a work-item that reads the slot sees the stores before the atomic_xchg. What a slot
-/// leads to is found by the slot's number, so it is loaded after the slot.
+/// x86), so a work-item that reads the slot sees the stores before the atomic_xchg. Data of a
+/// slot are found by the slot's number, so they are loaded after the slot.
 #ifndef ISOWAVE_ON_DEMAND_H
 #define ISOWAVE_ON_DEMAND_H
 

@@ -3,8 +3,8 @@
 /// (march_packets.cl). OpenCL C 1.2.
 ///
 /// A table has a place for each position in a group of 4^3 blocks; a block that comes later takes
-/// the place of another at the same position. No block leaves the cache meanwhile, so that whoever
-/// has lost its place may look the block up again.
+/// the place of another at the same position. No block leaves the cache meanwhile, so a ray
+/// whose block has lost its place may look the block up again.
 #ifndef ISOWAVE_OPENED_BLOCKS_H
 #define ISOWAVE_OPENED_BLOCKS_H
 
@@ -17,16 +17,6 @@
 #define ISO_OPENED_WORDS (ISO_BRICK_VOXELS + 4)
 /// In OpenedBlock::have: the block itself is cached, and its cells are known.
 #define ISO_OPENED_CACHED 0x100u
-
-/// The cache (block_cache.cl), as a work-item looks into it.
-typedef struct CacheReader {
-  global BlockEntry *table;
-  global const ulong *inside;
-  global const float *values;
-  global uint *slot_stamps;
-  uint stamp;           ///< read_stamp() of the pass: whoever opens a cached block stamps it
-  local uint *scratch;  ///< [8 * ISO_GROUP_SIZE]
-} CacheReader;
 
 typedef struct OpenedBlock {
   uint block_id;  ///< ISO_INVALID_ID: none so far
@@ -58,18 +48,17 @@ ISO_INLINE void copy_corner(global const float *values, uint corner, float *voxe
 /// Opens block b with what is cached of its dual grid.
 ISO_SELDOM void open_with_voxels(const CacheReader *cache, const FrameParams *frame, BlockCoords b,
                                  OpenedBlock *opened) {
-  local uint *slots = cache->scratch;
   uint have;
-  const ulong cells = open_block(frame, cache->table, cache->inside, b, slots, &have);
+  const ulong cells = open_block(frame, cache, b, &have);
   opened->block_id = block_id_at(frame, b.x, b.y, b.z);
   opened->have = have;
   opened->cells_low = (uint)cells;
   opened->cells_high = (uint)(cells >> 32);
   if ((have & 1u) == 0) return;
   opened->have |= ISO_OPENED_CACHED;
-  cache->slot_stamps[slots[0]] = cache->stamp; /* for all of the dual grid: last_use() */
+  stamp_block(cache);
   _Pragma("unroll") for (uint corner = 0; corner < 8; ++corner) {
-    const uint slot = slots[corner * ISO_GROUP_SIZE];
+    const uint slot = cache->slots[corner * ISO_GROUP_SIZE];
     if (slot != ISO_BLOCK_ABSENT)
       copy_corner(cache->values + slot * ISO_BLOCK_VOXELS, corner, opened->voxels);
   }
@@ -79,7 +68,7 @@ ISO_SELDOM void open_with_voxels(const CacheReader *cache, const FrameParams *fr
 /// pass by the cells of every third block. Else returns 0.
 ISO_INLINE int open_without_voxels(const CacheReader *cache, const FrameParams *frame,
                                    BlockCoords b, OpenedBlock *opened) {
-  /* What is read of an entry before its slot may be older (on_demand.h). */
+  /* Parts of an entry that are read before its slot may be older (on_demand.h). */
   volatile global const BlockEntry *entries = cache->table;
   const uint entry = find_entry(frame, cache->table, b.x, b.y, b.z),
              slot = entry == ISO_INVALID_ID ? ISO_BLOCK_ABSENT : entries[entry].slot;

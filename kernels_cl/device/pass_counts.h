@@ -4,7 +4,7 @@
 
 #include "portable/window.h"
 
-/// Opens the counts of the next pass. One work-item; nobody reads *next in this pass.
+/// Opens the counts of the next pass. One work-item; no other reads *next in this pass.
 ISO_INLINE void open_next_counts(const FrameParams *frame, global const PassCounts *counts,
                                  global PassCounts *next) {
   next->ray_count = frame_rays(frame);

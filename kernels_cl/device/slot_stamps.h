@@ -1,7 +1,7 @@
 /// slot_stamps.h -- when a cache slot was used last, and which slots are freed first. OpenCL C 1.2.
 ///
 /// A pass has two stamps, an even one for blocks that rays read in it, then an odd one for blocks
-/// that its waiting rays need. So a slot with an odd stamp holds a block that nobody has read since
+/// that its waiting rays need. So a slot with an odd stamp holds a block that no ray has read since
 /// it was asked for: mostly a wrong guess of speculation.
 #ifndef ISOWAVE_SLOT_STAMPS_H
 #define ISOWAVE_SLOT_STAMPS_H
@@ -47,7 +47,7 @@ ISO_INLINE void stamp_read(volatile global uint *slot_stamps, uint slot, uint st
 ///   of this frame, unread: the least recently used first
 ///   of this frame, read: the most recently used first
 /// So a view whose blocks fit is decoded once. Slots of this frame go only when it needs more
-/// blocks than there are slots. Of those that it has read, the least recently used would be freed
+/// blocks than there are slots. The least recently used of those that it has read would be freed
 /// shortly before the next frame reads them; so the first stay.
 ISO_INLINE uint eviction_rank(uint stamp, global const PassCounts *counts) {
   const uint now = needed_stamp(counts->pass), begin = read_stamp(counts->frame_pass),

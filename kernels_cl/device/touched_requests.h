@@ -16,9 +16,9 @@ typedef struct Requests {
   volatile local uint *num_staged;  ///< 0 at first
 } Requests;
 
-/// Of the given corners x + 2y + 4z (bits 0..7) of the 2^3 blocks from b on, those that nobody is
-/// known to have asked for. Most have been asked for by another ray: their bits tell, and cost
-/// neither a search in the table nor an atomic, for whose result one would wait.
+/// The given corners x + 2y + 4z (bits 0..7) of the 2^3 blocks from b on that no ray is known to
+/// have asked for. Most have been asked for by another ray: their bits tell, and cost neither a
+/// search in the table nor an atomic, for whose result this ray would wait.
 ISO_INLINE uint unasked_corners(const FrameParams *frame, BlockCoords b, uint corners,
                                 Requests requests) {
   uint unasked = corners;

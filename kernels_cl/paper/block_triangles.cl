@@ -3,8 +3,8 @@
 ///
 ///   block_triangles_count -> prefix sum of the counts -> block_triangles_write
 ///
-/// What is drawn, and not kept for anything else, needs no more: no neighbour's vertices, and no
-/// gradients. marching_cubes.cl makes meshes whose triangles share their vertices.
+/// Triangles that are only drawn need no more than that: no neighbour's vertices, and no gradients.
+/// marching_cubes.cl makes meshes whose triangles share their vertices.
 #include "device/dual_grid_inside.h"
 #include "device/work_group.h"
 #include "portable/block_vertex.h"

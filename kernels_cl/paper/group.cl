@@ -8,7 +8,7 @@
 ///
 /// Counting: slot_counts [slots] and candidate_count are 0 between passes. A pair whose own block
 /// is cached takes its rank among the pairs of that block from the count of the block's slot, and
-/// whoever gets rank 0 lists the slot as a candidate. Only then is each candidate's dual grid
+/// the pair that gets rank 0 lists the slot as a candidate. Only then is each candidate's dual grid
 /// looked up: eight blocks a block, not eight a pair. The visible ones draw places for their pairs,
 /// in whatever order they come. Nothing here costs more than O(pairs), whatever the number of slots
 /// or blocks.

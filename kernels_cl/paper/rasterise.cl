@@ -2,7 +2,7 @@
 ///
 ///   raster_clear -> [ raster_part for depth -> raster_part for triangle -> raster_hits ]*
 ///
-/// A mesh may come in parts. Of each part, the first turn finds each pixel's least distance
+/// A mesh may come in parts. For each part, the first turn finds each pixel's least distance
 /// (atomic_min), the second the first triangle that has it (atomic_min), and the third makes hits
 /// of these. No outcome depends on the order in which work-items run, nor on how a mesh is cut: of
 /// equally near triangles the earlier part's stays.

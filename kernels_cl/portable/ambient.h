@@ -26,13 +26,13 @@ typedef struct AmbientParams {
 } AmbientParams;
 ISO_CHECK_SIZE(AmbientParams, 108);
 
-/// Of length 1, z along the normal.
+/// A direction of length 1, z along the normal.
 typedef struct AmbientDirection {
   float x, y, z;
 } AmbientDirection;
 ISO_CHECK_SIZE(AmbientDirection, 12);
 
-/// Which turn of the spiral a pixel has: neighbours have different ones.
+/// The turn of the spiral that a pixel has: neighbours have different ones.
 ISO_INLINE uint ambient_pattern(const FrameParams *frame, uint pixel) {
   const uint x = pixel % frame->view.width & 3u, y = pixel / frame->view.width & 3u;
   const uint mixed = x ^ y; /* the bits of x ^ y and y, in turns, from the lowest: ordered dither */
@@ -52,7 +52,7 @@ ISO_INLINE float inner_product(AmbientDirection a, AmbientDirection b) {
   return fma(a.x, b.x, fma(a.y, b.y, a.z * b.z));
 }
 
-/// Of length 1; unchanged where it has none.
+/// v with length 1; unchanged if v is 0.
 ISO_INLINE AmbientDirection normalized(AmbientDirection v) {
   const float x = fabs(v.x), y = fabs(v.y), z = fabs(v.z);
   const float xy = x > y ? x : y, largest = z > xy ? z : xy;

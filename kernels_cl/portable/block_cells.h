@@ -53,14 +53,14 @@ ISO_INLINE int next_cell(CellWalk *at, const Ray *ray, LastPlanes last) {
   return 1;
 }
 
-/// Which of its block's cells it is, x + 4y + 16z.
+/// The number of a cell in its block, x + 4y + 16z.
 ISO_INLINE uint cell_in_block(const GridWalk *cell) {
   return (uint)((cell->x & 3) + 4 * (cell->y & 3) + 16 * (cell->z & 3));
 }
 
-/// Which corners of a block's cells are inside: bit x + 4y + 16z of v[corner x + 2y + 4z]. inside
-/// [8]: which voxels of the blocks of its dual grid are; where one is not known, the cells that
-/// need it have any bit.
+/// The corners of a block's cells that are inside: bit x + 4y + 16z of v[corner x + 2y + 4z].
+/// inside [8]: the voxels of its dual grid's blocks that are inside. If a block is not known, the
+/// cells that need it have any bit.
 ISO_INLINE void corners_inside(const ulong *inside, ulong *v) {
   /* Voxels at +x of every cell: own voxels moved one down, the last layer from the neighbour. The
    * same for +y, +z. */

@@ -19,7 +19,7 @@ typedef struct BlockEntry {
 } BlockEntry;
 ISO_CHECK_SIZE(BlockEntry, 16);
 
-/// Both halves of the changing cells of a block while nobody has looked. A work-item that reads
+/// Both halves of the changing cells of a block that no ray has looked at. A work-item that reads
 /// while another writes may get one half of each: cells too many, which does no harm.
 #define ISO_CHANGING_UNKNOWN 0xFFFFFFFFFFFFFFFFul
 
@@ -27,7 +27,7 @@ ISO_INLINE ulong changing_of(ISO_GLOBAL const BlockEntry *entry) {
   return (ulong)entry->changing_high << 32 | entry->changing_low;
 }
 
-/// What the cache's kernels leave for each other, and for the next pass.
+/// Counts and places that the cache's kernels leave for each other, and for the next pass.
 typedef struct CacheState {
   uint
       first_block_id;  ///< the block that the pass must serve, or ISO_INVALID_ID; of its dual grid,
@@ -49,7 +49,7 @@ typedef struct CacheState {
 #define ISO_TABLE_STEP \
   9u  ///< from entry to entry of a search; odd, and no factor of the table's size
 
-/// Where the search for block (x,y,z) begins. frame->schedule.table_groups: entries / 8.
+/// The first entry of the search for block (x,y,z). frame->schedule.table_groups: entries / 8.
 ISO_INLINE uint table_home(const FrameParams *frame, uint x, uint y, uint z) {
   const uint layer = id_layer(frame, z); /* the same seen from every level */
   uint h = ((x >> 1) * 0x9E3779B1u) ^ ((y >> 1) * 0x85EBCA77u) ^ ((layer >> 1) * 0xC2B2AE3Du);

@@ -39,7 +39,7 @@ ISO_INLINE uint pack_steps(float x, float y, float z) {
   return block_steps(x) << 20 | block_steps(y) << 10 | block_steps(z);
 }
 
-/// Of a vertex of block b.
+/// The point of a vertex of block b.
 ISO_INLINE LatticePoint lattice_point(BlockCoords b, uint steps) {
   LatticePoint p;
   p.x = ISO_BLOCK_STEPS * b.x + (steps >> 20);

@@ -15,7 +15,7 @@
 /// device divides within 2.5 ulp, as OpenCL allows. So a moment in float32 is off by at most 7.1 u
 /// of itself, and the two-float one by far less than the 0.1. Two moments that are further apart
 /// than 16 u = 2^-20 of the one with the larger magnitude are in the order that two-float finds:
-/// 14.2 u cover what both are off by, the rest covers the rounding of their difference. Where the
+/// 14.2 u cover what both are off by, the rest covers the rounding of their difference. If the
 /// smaller moment has the larger magnitude, it is negative. The other one is then either not, and
 /// signs are exact, or so near that the same rest covers the difference of their magnitudes.
 /// Closer moments are in doubt, and two-float decides.
@@ -393,14 +393,15 @@ ISO_INLINE int clip_to_box(const Ray *r, LastPlanes begin, LastPlanes end, RayEv
          clip_to_slab(r->z, 2, begin.z, end.z, enter, exit) && event_before(*enter, *exit);
 }
 
-/// Where the ray enters the box, or starts in it. Returns 0 if it never does.
+/// The event by which the ray enters the box, or starts in it. Returns 0 if it never does.
 ISO_INLINE int box_entry(const Ray *r, LastPlanes begin, LastPlanes end, RayEvent *enter) {
   RayEvent exit = border_event(INFINITY);
   *enter = start_event();
   return clip_to_box(r, begin, end, enter, &exit);
 }
 
-/// Where the ray enters the domain [0, dims-1], or starts in it. Returns 0 if it never does.
+/// The event by which the ray enters the domain [0, dims-1], or starts there. Returns 0 if it never
+/// does.
 ISO_INLINE int domain_entry(const Ray *r, LastPlanes last, RayEvent *enter) {
   LastPlanes zero;
   zero.x = zero.y = zero.z = 0;

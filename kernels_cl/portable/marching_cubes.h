@@ -7,8 +7,8 @@
 /// voxel: the place of one among them is a count of bits.
 ///
 /// Edges of a cell: 4 a + k goes along axis a from the corner whose places along the two other
-/// axes, the lower first, are the bits of k. Which triangles a cell has, is in a table by the signs
-/// of its corners (core/mesh/cell_triangles.hpp).
+/// axes, the lower first, are the bits of k. A table has the triangles of a cell by the signs of
+/// its corners (core/mesh/cell_triangles.hpp).
 #ifndef ISOWAVE_MARCHING_CUBES_H
 #define ISOWAVE_MARCHING_CUBES_H
 
@@ -22,7 +22,7 @@ ISO_NAMESPACE_BEGIN
 #define ISO_CELL_TRIANGLES 5u  ///< at most
 #define ISO_VERTEX_BLOCK_SHIFT 8  ///< MeshVertex::edge
 
-/// Which edges of a block have a vertex: bit x + 4y + 16z of the lower voxel, for each axis.
+/// The edges of a block that have a vertex: bit x + 4y + 16z of the lower voxel, for each axis.
 typedef struct BlockEdges {
   ulong x, y, z;
 } BlockEdges;
@@ -99,7 +99,7 @@ ISO_INLINE uint vertex_rank(ulong x, ulong y, ulong z, uint axis, uint voxel) {
   return count_bits(x) + count_bits(y) + count_bits(z & below);
 }
 
-/// Where the field crosses the isovalue between two voxels of which one is inside, 0 to 1. Halves,
+/// The place, 0 to 1, where the field crosses the isovalue between two voxels, one inside. Halves,
 /// so that no difference overflows; scaling by a power of two changes no quotient.
 ISO_INLINE float edge_crossing(float lower, float upper, float isovalue) {
   const float a = 0.5f * lower - 0.5f * isovalue, b = 0.5f * upper - 0.5f * isovalue;

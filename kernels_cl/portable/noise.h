@@ -23,7 +23,7 @@ typedef struct NoiseOctave {
 } NoiseOctave;
 ISO_CHECK_SIZE(NoiseOctave, 32);
 
-/// What one lattice plane x = const contributes to a row: offset + slope * (distance from the
+/// The contribution of one lattice plane x = const to a row: offset + slope * (distance from the
 /// plane).
 typedef struct NoiseLine {
   double offset, slope;
@@ -35,7 +35,7 @@ typedef struct NoiseLine {
 #define ISO_NOISE_SCAN 3u
 #define ISO_NOISE_NOISY_SCAN 4u
 
-/// Which field, on which grid.
+/// A field and its grid.
 typedef struct NoiseShape {
   double last_x, last_y, last_z;  ///< voxels along each axis, less one
   ulong seed;                     ///< of what is drawn for each voxel
@@ -58,8 +58,8 @@ ISO_INLINE ulong noise_hash(ulong x) {
   return x ^ (x >> 31);
 }
 
-/// Of lattice plane x, in the row whose lattice cell is (y, z) and that lies (local_y, local_z) in
-/// it. Gradients are the 12 edge midpoints of the cube [-1, 1]^3: axis-fair and exact.
+/// The line of lattice plane x, in the row that lies at (local_y, local_z) in lattice cell (y, z).
+/// Gradients are the 12 edge midpoints of the cube [-1, 1]^3: axis-fair and exact.
 ISO_INLINE NoiseLine noise_line(double amplitude, ulong seed, uint x, uint y, uint z,
                                 double local_y, double local_z) {
   const double fade_y = noise_fade(local_y), fade_z = noise_fade(local_z);
@@ -93,7 +93,7 @@ ISO_INLINE double noise_between(NoiseLine left, NoiseLine right, double along, d
 #define ISO_NOISE_THICKNESS 0.06 /* of the mixing layer's step, in heights of the volume */
 #define ISO_NOISE_ENVELOPE 0.14  /* half width of its turbulent zone, in heights */
 
-/// What group a's sum begins with.
+/// The value that the sum of group a begins with.
 ISO_INLINE double noise_begin(const NoiseShape s, uint y) {
   return s.kind == ISO_NOISE_MIXING_LAYER ? (y / s.last_y - 0.5) / ISO_NOISE_THICKNESS : 0;
 }

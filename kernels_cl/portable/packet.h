@@ -1,7 +1,7 @@
 /// packet.h -- eight rays at a time: pure functions, as those of the scalar headers without
 /// `packet_`, with the same bits.
 ///
-/// Portable: OpenCL C 1.2 and C++. Whoever includes it brings the vectors, device/float8.h or
+/// Portable: OpenCL C 1.2 and C++. The file that includes it brings the vectors, device/float8.h or
 /// core/host/float8.hpp: Floats, Ints and Mask (-1 or 0 in each lane), the functions of OpenCL C
 /// that are used here, and those that both list.
 ///
@@ -21,7 +21,7 @@ typedef struct PacketAxis {
   Floats sign;  ///< 1 or -1, by up
 } PacketAxis;
 
-/// Where rays cross a plane; axis ISO_AXIS_START: where they start.
+/// The plane that each ray crosses; axis ISO_AXIS_START: the ray starts there.
 typedef struct Crossings {
   Ints axis;
   Floats plane;
@@ -35,7 +35,7 @@ typedef struct Cubics {
   Floats b0, b1, b2, b3;
 } Cubics;
 
-/// Where rays are, for what asks the scalar functions.
+/// The places of rays, for the scalar functions.
 typedef struct PacketRays {
   PacketAxis axis[3];
   Crossings entered;  ///< by which rays entered the regions where they are
@@ -270,8 +270,8 @@ ISO_RARE Ints settle_places(const PacketRays *r, int axis, int size, Range range
 }
 
 /// The regions along one axis that rays are in just after they crossed r->entered, about at t.
-/// Where that is a plane of this axis, half a voxel behind it decides, which is exact. Else the
-/// position o + t d decides where it is further from a plane than its error: 7.1 u |t d| of t
+/// If that is a plane of this axis, half a voxel behind it decides, which is exact. Else the
+/// position o + t d decides if it is further from a plane than its error: 7.1 u |t d| of t
 /// (grid_dda.h) and u |o + t d| of rounding, at most 8.2 u (|o + t d| + |o|).
 ISO_INLINE Ints packet_locate(const PacketRays *r, int axis, int size, Floats t, Range range,
                               Mask lanes) {

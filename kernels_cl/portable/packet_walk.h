@@ -9,8 +9,8 @@
 /// A ray keeps the crossing by which it entered the region that it is in, as axis and plane: the
 /// moment follows from these when a cell is tested.
 ///
-/// Portable: OpenCL C 1.2 and C++. Whoever includes it says before where blocks come from: a type
-/// PacketField, and
+/// Portable: OpenCL C 1.2 and C++. The file that includes it defines before where blocks come from:
+/// a type PacketField, and
 ///
 ///     /// The bits of macrocells (bit x + 4y + 16z: is the block active?), low and high half, into
 ///     /// those lanes. macrocells: x + columns * (y + rows * z).
@@ -40,7 +40,7 @@ ISO_PACKET_NAMESPACE_BEGIN
 /// Voxels along the edge of a region of that level.
 #define ISO_REGION_SIZE(level) (1 << (2 * (level)))
 
-/// Where the rays are among the regions of one size.
+/// The regions of one size in which the rays are.
 typedef struct PacketLevel {
   Floats far[3];   ///< planes by which they leave
   Ints place;      ///< number of the region in the larger one, x + 4y + 16z; macrocells: in the
@@ -67,7 +67,7 @@ typedef struct Packet {
   FoundCells found;
 } Packet;
 
-/// What is the same for many packets.
+/// Data that many packets share.
 typedef struct PacketScene {
   const FrameParams *frame;
   const PacketField *field;
@@ -107,8 +107,7 @@ ISO_INLINE int make_packet_scene(const FrameParams *frame, const PacketField *fi
 /// that to_ints() is floor().
 ISO_INLINE Ints regions(const Packet *p, int level, int axis) {
   const Floats far = p->level[level].far[axis];
-  /* Where the domain's end cuts the last region, the plane before its far one is still within it.
-   */
+  /* If the domain's end cuts the last region, the plane before its far one is still within it. */
   const PacketAxis *a = &p->rays.axis[axis];
   const Floats within = in_brick(a, pick(a->up, far - 1.0f, far));
   return to_ints(within * (1.0f / (float)ISO_REGION_SIZE(level)));
@@ -158,7 +157,7 @@ ISO_INLINE void open_packet(Packet *p, const PacketScene *scene) {
   p->found.enter.plane = p->found.exit.plane = p->found.lo = p->found.hi = none;
 }
 
-// ---- Where rays begin
+// ---- The beginning of rays
 
 typedef struct Entered {
   Mask lanes;
@@ -189,7 +188,8 @@ ISO_RARE Entered settle_box_entries(const PacketRays *r, const PacketScene *scen
   return settled;
 }
 
-/// Where rays enter the box of active blocks, or start in it, into r->entered. Returns which do.
+/// r->entered = the crossings by which rays enter the box of active blocks, or start in it. Returns
+/// the lanes that do.
 ISO_INLINE Mask enter_box(PacketRays *r, const PacketScene *scene) {
   Floats near[3], exit = floats(ISO_NEVER);
   Mask beside = ints(0);
@@ -437,7 +437,7 @@ ISO_INLINE void find_segments(const PacketRays *r, Crossings enter, Crossings ex
   }
 }
 
-/// Where lanes have a change of inside, and its bracket.
+/// The lanes that have a change of inside, and its bracket.
 typedef struct Brackets {
   Mask lanes;
   Floats lo, hi;

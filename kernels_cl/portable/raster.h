@@ -10,7 +10,7 @@
 /// the ray is its origin. A corner's point depends on its place and the ray alone, so all triangles
 /// that share the corner see the same point. On which side of an edge the origin is, is decided
 /// without error (side_of_edge()), and an edge belongs to both of its triangles. So no ray slips
-/// between the triangles of a closed surface. Where several are met, the nearest counts, and of
+/// between the triangles of a closed surface. If several are met, the nearest counts, and of
 /// equally near ones the first of the mesh.
 ///
 /// Nothing is projected through the eye, so nothing needs to be clipped before it: what is behind
@@ -144,7 +144,7 @@ ISO_INLINE float side_of_edge(float a, float b, float c, float d) {
   return (ab - cd) + (fma(a, b, -ab) - fma(c, d, -cd));
 }
 
-/// Where a ray meets a triangle.
+/// The point where a ray meets a triangle.
 typedef struct TriangleHit {
   float forward;
   float a, b, c;  ///< weights of the corners, 0 to 1

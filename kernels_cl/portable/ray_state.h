@@ -35,7 +35,7 @@ typedef struct RayEntry {
   uint in_doubt;   ///< 0 or 1: where it stands, its next march must settle a doubt
 } RayEntry;
 
-/// Where a ray stands, and goes on from.
+/// The place where a ray stands, and goes on from.
 typedef struct RayStand {
   uint block_id;
   uint side;  ///< if it stands behind a border of levels of detail, where it was before: ISO_SIDE_*

@@ -49,8 +49,8 @@ ISO_INLINE uint to_byte(float c) {
   return (uint)fma(c, 255.0f, 0.5f);
 }
 
-/// Of the ray of that number. open: how much of the sky its hit sees, [0,1]; as much of all lights
-/// but the headlight's gets there.
+/// The color of a ray. open: the share of the sky that its hit sees, [0,1]; the same share of all
+/// lights but the headlight's gets there.
 ISO_INLINE Color shade_ray(const FrameParams *frame, ISO_CONSTANT const ShadeParams *p, uint ray_id,
                            float t, float gx, float gy, float gz, float open) {
   const Ray ray = make_ray(frame, ray_id);
@@ -99,9 +99,8 @@ ISO_INLINE Color shade_ray(const FrameParams *frame, ISO_CONSTANT const ShadePar
 /// RGBA, 8 bits each, red in bits 0..7: of the pixel at a column and row of the picture, which has
 /// samples times samples rays of the frame. A is 255 where any of them hits, else 0.
 ///
-/// open_counts  [ray] ambient rays of its hit that met nothing (ambient.h), of num_ambient; 0:
-/// there
-///              are none, and all is open
+/// open_counts  [ray] ambient rays of its hit that met nothing (ambient.h)
+/// num_ambient  ambient rays of a hit; 0: there are none, and all is open
 ISO_INLINE uint shade_pixel(const FrameParams *frame, ISO_CONSTANT const ShadeParams *p,
                             uint samples, uint column, uint row, ISO_GLOBAL const HitRecord *hits,
                             ISO_GLOBAL const uchar *open_counts, uint num_ambient) {

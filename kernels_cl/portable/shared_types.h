@@ -108,8 +108,8 @@ typedef struct BlockGrid {
 } BlockGrid;
 ISO_CHECK_SIZE(BlockGrid, 24);
 
-/// Where a level's blocks, ranges and masks lie among those of all levels of detail. Ids of blocks
-/// count on through all levels: block (x,y,z) of this one is number
+/// The places of a level's blocks, ranges and masks among those of all levels of detail. Ids of
+/// blocks count on through all levels: block (x,y,z) of this one is number
 /// x + blocks_x (y + blocks_y (begin_z + z)).
 typedef struct LevelPlace {
   uint blocks_x, blocks_y;         ///< blocks of the finest level
@@ -204,7 +204,7 @@ typedef struct PairHit {
 } PairHit;
 ISO_CHECK_SIZE(PairHit, 8);
 
-/// Where the pairs of a visible block lie among those gathered by block: from begin to below end.
+/// The pairs of a visible block among those gathered by block: from begin to below end.
 typedef struct BlockRays {
   uint begin, end;
 } BlockRays;
@@ -229,7 +229,7 @@ typedef struct GivenRay {
 } GivenRay;
 ISO_CHECK_SIZE(GivenRay, 28);
 
-/// Where a compressed volume's blocks begin in its zfp stream, and how they are decoded.
+/// Says where a compressed volume's blocks begin in its zfp stream, and how they are decoded.
 typedef struct StreamLayout {
   uint bits_per_block;  ///< at a fixed rate; 0: blocks have lengths of their own, see block_index.h
   uint words_per_part;  ///< of a stream in several buffers: see block_stream.h
@@ -256,9 +256,9 @@ ISO_CHECK_SIZE(VoxelRange, 8);
 #define ISO_ALL_PLANES (-1074)  ///< StreamLayout::min_exponent, and zfp's own
 #define ISO_REVERSIBLE (-1075)  ///< the same of a reversible stream: other blocks (zfp_codec.h)
 
-/// What one pass did, counted on the device; the host reads it one pass behind. Stages whose input
-/// is "the first n entries" take n from a field of this struct, so that no launch waits for the
-/// host.
+/// The work of one pass, counted on the device; the host reads it one pass behind. Stages whose
+/// input is "the first n entries" take n from a field of this struct, so that no launch waits for
+/// the host.
 typedef struct PassCounts {
   uint ray_count;   ///< width * height of the frame
   uint pass;        ///< number of the pass since the cache was made: the clock of its slots' stamps

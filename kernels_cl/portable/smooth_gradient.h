@@ -3,10 +3,10 @@
 ///
 /// The gradient of the trilinear field itself jumps from cell to cell, which shows as facets and
 /// grooves. This one is the same from both sides of a face of cells: there it depends on the face's
-/// four voxels alone. Of 4^3 voxels around the cell it needs 32: those beyond the cell along one
-/// axis. Along each axis they lie in at most two blocks.
+/// four voxels alone. It needs 32 of the 4^3 voxels around the cell: those beyond the cell along
+/// one axis. Along each axis they lie in at most two blocks.
 ///
-/// At the domain's border, and beside a voxel without data, a difference is one-sided. Where all
+/// At the domain's border, and beside a voxel without data, a difference is one-sided. If all
 /// differences vanish, as in a sheet one voxel thick, there is no smooth gradient, and the cell's
 /// own stays.
 #ifndef ISOWAVE_SMOOTH_GRADIENT_H
@@ -43,7 +43,7 @@ ISO_INLINE StencilAxis stencil_axis(int cell, int last_plane) {
   return axis;
 }
 
-/// Of a hit's cell in block b.
+/// The stencil of a hit in a cell of block b.
 ISO_INLINE Stencil stencil_of(BlockCoords b, uint cell, LastPlanes last) {
   Stencil s;
   s.x = stencil_axis((int)(4 * b.x + (cell & 3)), last.x);
@@ -61,7 +61,7 @@ ISO_INLINE BlockCoords stencil_base(const Stencil *s) {
   return base;
 }
 
-/// Which of the blocks base and base + 1 along an axis two voxels are in: bits 0 and 1.
+/// The blocks, of base and base + 1 along an axis, that two voxels are in: bits 0 and 1.
 ISO_INLINE uint blocks_of_voxels(int a, int b, uint base) {
   return 1u << (((uint)a >> 2) - base) | 1u << (((uint)b >> 2) - base);
 }

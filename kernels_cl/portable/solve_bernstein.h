@@ -28,7 +28,7 @@ ISO_INLINE float same_sign_fraction(float n, float m) {
   return (n > 0.0f && m > 0.0f) || (n < 0.0f && m < 0.0f) ? n / (n + m) : -1.0f;
 }
 
-/// Where the cubic has its extrema, first <= second; -1 for none.
+/// The extrema of a cubic, first <= second; -1 for none.
 typedef struct Extrema {
   float first, second;
   float discriminant;  ///< of the derivative, whose largest coefficient is scaled to 1

@@ -5,8 +5,8 @@
 /// returns 1 and a bracket of the first s at which inside (value >= 0) differs from inside at s =
 /// 0; 0 if it never does. refine() places the root in the bracket with at most max_steps steps; 0
 /// leaves the first guess. They are apart so that a work-group's rays refine together after their
-/// walks, not one by one in the midst of the others' walks. What each keeps of that contract stands
-/// above it:
+/// walks, not one by one in the midst of the others' walks. Above each solver stands what it keeps
+/// of that contract:
 ///
 ///   solver      misses                                  refinement          cost
 ///   linear      every even number of crossings          false position      least

@@ -16,12 +16,12 @@ ISO_INLINE uint frame_rays(const FrameParams *frame) {
   return frame->view.width * frame->view.height;
 }
 
-/// Of so many rays, those that take part.
+/// The number of rays that take part, of num_rays.
 ISO_INLINE uint rays_in_window(uint window, uint num_rays) {
   return num_rays < window ? num_rays : window;
 }
 
-/// Of the first pass of a frame: for all rays.
+/// The window of the first pass of a frame: all rays.
 ISO_INLINE uint first_window(const FrameParams *frame) {
   return frame_rays(frame);
 }

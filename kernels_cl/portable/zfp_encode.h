@@ -72,8 +72,8 @@ ISO_INLINE void forward_lift(uint *v, int stride) {
   v[3 * stride] = w;
 }
 
-/// Where coordinate i, 0..3, of a partial block with `count` voxels along an axis, 1..4, takes its
-/// value from.
+/// The coordinate from which coordinate i, 0..3, of a partial block with `count` voxels along an
+/// axis, 1..4, takes its value.
 ISO_INLINE uint padded_coordinate(uint i, uint count) {
   if (i < count) return i;
   return i == 3u ? 0u : count - 1u;

@@ -6,8 +6,13 @@ set(package_folder ${CMAKE_INSTALL_LIBDIR}/cmake/isowave)
 install(TARGETS isowave_library EXPORT isowaveTargets
         ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
         LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library)
+set(left_out "")
+if(NOT ISOWAVE_OPENCL)
+  set(left_out REGEX "/(bricks|device|extract|isowave|quick_renderer)[.]hpp$" EXCLUDE)
+endif()
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/core/api/isowave
-        DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT library FILES_MATCHING PATTERN *.hpp)
+        DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT library
+        FILES_MATCHING PATTERN *.hpp ${left_out})
 install(EXPORT isowaveTargets NAMESPACE isowave:: DESTINATION ${package_folder} COMPONENT library)
 configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/isowaveConfig.cmake.in
                               ${PROJECT_BINARY_DIR}/isowaveConfig.cmake

@@ -14,6 +14,7 @@
 #include "core/io/atomic_file.hpp"
 #include "core/io/open_volume.hpp"
 #include "core/ocl/device.hpp"
+#include "core/sources/noise_on_device.hpp"
 #include "core/stages/zfp_encode.hpp"
 #include "core/zfp/describe_compression.hpp"
 #include "core/zfp/zfp_accuracy.hpp"
@@ -50,15 +51,16 @@ CompressedVolume convert_together(const ConvertArgs &options, const RawOverrides
   agree_on(team, "version", program_name());
   agree_on(team, "command line", MpiJob::command_line());
   std::optional<ocl::Device> device;
-  ocl::Device *maker = nullptr;
+  NoiseMaker noise;
   VolumeInfo info;
   together(team, [&] {
     if (team.rank() == 0) check_output(options);
     if (options.device) {
-      maker = &device.emplace(choose_local_device(*options.device, MpiJob::local_rank()));
-      compress.encoder = encoder_on(*maker);
+      device.emplace(choose_local_device(*options.device, MpiJob::local_rank()));
+      compress.encoder = encoder_on(*device);
+      noise = noise_on(device->info());
     }
-    info = open_any_volume(options.path, overrides, maker)->info();
+    info = open_any_volume(options.path, overrides, noise)->info();
     warn_of_header(options.path, overrides);
   });
   agree_on(team, "volume", fingerprint(options.path, info));
@@ -69,19 +71,20 @@ CompressedVolume convert_together(const ConvertArgs &options, const RawOverrides
   compress.input.progress = make_progress_bar("compressing");
   const std::unique_ptr<SharedFile> file = MpiJob::create_file(options.output);
   return compress_together(
-      team, [&] { return open_any_volume(options.path, overrides, maker); }, compress, *file);
+      team, [&] { return open_any_volume(options.path, overrides, noise); }, compress, *file);
 }
 
 CompressedVolume convert_alone(const ConvertArgs &options, const RawOverrides &overrides,
                                CompressOptions &compress) {
   check_output(options);
   std::optional<ocl::Device> device;
-  ocl::Device *maker = nullptr;
+  NoiseMaker noise;
   if (options.device) {
-    maker = &device.emplace(ocl::choose_device(*options.device));
-    compress.encoder = encoder_on(*maker);
+    device.emplace(ocl::choose_device(*options.device));
+    compress.encoder = encoder_on(*device);
+    noise = noise_on(device->info());
   }
-  const std::unique_ptr<VolumeReader> reader = open_any_volume(options.path, overrides, maker);
+  const std::unique_ptr<VolumeReader> reader = open_any_volume(options.path, overrides, noise);
   warn_of_header(options.path, overrides);
   std::optional<CompileReport> compiling;
   if (device) compiling.emplace(*device);

@@ -5,6 +5,7 @@
 // isowave generate: writes a synthetic volume in the Open-SciVis naming.
 
 #include "core/sources/generate.hpp"
+#include "core/sources/noise_on_device.hpp"
 
 #include <fmt/format.h>
 
@@ -70,7 +71,7 @@ void run_generate(const CLI::App &command, const GenerateArgs &options) {
   generate.dims = to_dims(options.dims);
   if (!has_seed(generate.field))
     refuse_options(command, {"--seed"}, "is of noise, and this field has none");
-  if (options.device) generate.device = ocl::choose_device(*options.device);
+  if (options.device) generate.noise = noise_on(ocl::choose_device(*options.device));
   check_space(generate, options.output);
   const std::filesystem::path path =
       generate_to_file(generate, options.output, make_progress_bar("generating"));

@@ -15,6 +15,8 @@
 #include "core/ocl/device.hpp"
 #include "core/platform/streams.hpp"
 #include "core/sources/generate.hpp"
+#include "core/sources/noise_on_device.hpp"
+#include "core/stages/zfp_encode.hpp"
 #include "core/zfp/describe_compression.hpp"
 #include "core/zfp/isovalue.hpp"
 #include "core/zfp/zfp_accuracy.hpp"
@@ -143,16 +145,19 @@ CompressedVolume load_volume(const std::string &path, const RawOverrides &overri
     return open_compressed_volume(path, overrides);
   }
   warn_of_header(path, overrides);
-  Storage storage = to_storage(compression);
-  storage.device = device;
-  return compress_volume([&] { return open_any_volume(path, overrides, device); }, path, storage);
+  const Storage storage = storage_for(path, compression, device);
+  return compress_volume([&] { return open_any_volume(path, overrides, storage.noise); }, path,
+                         storage);
 }
 
 Storage storage_for(const std::string &path, const CompressionOptions &compression,
                     ocl::Device *device) {
   if (is_zfp_name(path)) refuse_compression(compression, path);
   Storage storage = to_storage(compression);
-  storage.device = device;
+  if (device != nullptr) {
+    storage.encoder = encoder_on(*device);
+    storage.noise = noise_on(device->info());
+  }
   return storage;
 }
 

@@ -10,10 +10,15 @@
 #include <string_view>
 #include <vector>
 
+#include "core/ocl/device.hpp"
 #include "core/sources/load_volume.hpp"
 #include "core/volume/block_box.hpp"
 #include "core/volume/volume.hpp"
 #include "core/zfp/zfp_stream.hpp"
+
+namespace isowave::core::ocl {
+class Device;
+}
 
 namespace isowave::core::tools {
 

@@ -1,8 +1,9 @@
 #pragma once
-// The part of isowave that needs no OpenCL.
+// The part of isowave that needs no OpenCL. A library that was built with -DISOWAVE_OPENCL=OFF has
+// this part alone.
 //
 //   auto volume = isowave::open_volume("head.nrrd");
-//   isowave::HostRenderer renderer(volume);
+//   isowave::Renderer renderer = isowave::make_host_renderer(volume);
 //   isowave::Frame frame = renderer.render({.camera = renderer.camera(80), .isovalue = 80});
 //   isowave::Mesh mesh = isowave::extract(volume, 80);
 
@@ -11,5 +12,6 @@
 #include "isowave/frame.hpp"
 #include "isowave/host_renderer.hpp"
 #include "isowave/mesh.hpp"
+#include "isowave/renderer.hpp"
 #include "isowave/version.hpp"
 #include "isowave/volume.hpp"

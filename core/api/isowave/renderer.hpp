@@ -8,11 +8,13 @@
 #include <string>
 #include <vector>
 
-#include "isowave/device.hpp"
 #include "isowave/frame.hpp"
 #include "isowave/volume.hpp"
 
 namespace isowave {
+
+class Device;
+struct DeviceInfo;
 
 /// What a renderer is made for. Its memory is taken when it is made; without a budget and
 /// cache_blocks, the cache grows between frames, should these need more blocks.

@@ -13,11 +13,11 @@ import numpy.typing as npt
 
 from isowave import _core
 from isowave._camera import Camera
-from isowave._checked import flag, number, size_of, whole
+from isowave._checked import number, size_of
 from isowave._compress import compression_options
 from isowave._image import Image
 from isowave._placed import Placed
-from isowave._renderer import bytes_of, warn_of_isovalue
+from isowave._renderer import draw, renderer_options, warn_of_isovalue
 from isowave._request import Request
 
 OUTPUTS = ("rgb", "depth", "normals")
@@ -124,27 +124,19 @@ class BrickRenderer(Placed[_core.Renderer]):
     ) -> None:
         self._processes = Processes(comm)
 
-        def read() -> tuple[tuple[int, int], dict[str, Any], dict[str, Any]]:
-            width, height = size_of(size)
+        def read() -> tuple[dict[str, Any], dict[str, Any]]:
             compression = compression_options(
                 tolerance, relative_tolerance, rate, exact, 1, map_nan, no_data, 0
             )
             compression["measure_error"] = False
-            options = {
-                "device": "" if device is None else str(device),
-                "bricks": None if bricks is None else "{}x{}x{}".format(*bricks),
-                "width": width,
-                "height": height,
-                "samples": whole("samples", samples),
-                "memory_budget": bytes_of(memory_budget),
-                "cache_blocks": whole("cache_blocks", cache_blocks),
-                "with_levels": flag("levels", levels),
-                "with_bounds": flag("bounds", bounds),
-                "with_rays": flag("rays", rays),
-            }
-            return (width, height), compression, options
+            can = {"levels": levels, "bounds": bounds, "rays": rays}
+            options = renderer_options(size, samples, memory_budget, cache_blocks, **can)
+            options["device"] = "" if device is None else str(device)
+            options["bricks"] = None if bricks is None else "{}x{}x{}".format(*bricks)
+            return compression, options
 
-        self.size, compression, options = self._processes.together(read)
+        compression, options = self._processes.together(read)
+        self.size: tuple[int, int] = (options["width"], options["height"])
         self._core = _core.team_renderer(self._processes, os.fsdecode(path), compression, options)
         if self._processes.rank == 0:
             for notice in self._core.notices:
@@ -152,7 +144,7 @@ class BrickRenderer(Placed[_core.Renderer]):
 
     @property
     def device(self) -> dict[str, Any]:
-        """This process's, as an entry of isowave.devices()."""
+        """This process's, as Renderer.device."""
         return self._core.device
 
     def camera(self, isovalue: float, size: tuple[int, int] | None = None) -> Camera:
@@ -205,7 +197,7 @@ class BrickRenderer(Placed[_core.Renderer]):
             raise _core.Error("some processes give a camera, and others none: ask alike")
         if camera is None:
             request = replace(request, camera=self.camera(request.isovalue, request.size))
-        frame = self._core.render(request.for_core(), None, False)
+        frame = draw(self._core, request, interrupts=False)
         if self._processes.rank != 0:
             return None
         warn_of_isovalue(self._core, request.isovalue)

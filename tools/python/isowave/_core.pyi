@@ -108,6 +108,8 @@ class PassView:
     def picture(self) -> NDArray[np.uint8]: ...
 
 class Renderer:
+    """Made by device_renderer(), host_renderer() and team_renderer()."""
+
     def render(
         self,
         request: dict[str, Any],
@@ -145,7 +147,6 @@ def team_renderer(
     compression: dict[str, Any],
     options: dict[str, Any],
 ) -> Renderer: ...
-
 def save_mesh(
     vertices: NDArray[np.float32] | NDArray[np.float64],
     faces: NDArray[np.uint32],

@@ -18,14 +18,31 @@ from isowave._camera import Camera
 from isowave._checked import flag, number, refuse, size_of, whole
 from isowave._image import Image
 from isowave._levels import Voxels
-from isowave._request import ALL_OUTPUTS, Color, Progress, Request, checked_normals
+from isowave._request import ALL_OUTPUTS, Color, Progress, Request, normals_of
 
 #: Arguments of Renderer that let frames ask for more.
 CAPABILITIES = ("levels", "bounds", "time_budget", "rays")
 
 
-def bytes_of(memory_budget: int | None) -> int | None:
-    return None if memory_budget is None else whole("memory_budget", memory_budget, 2**64 - 1)
+def renderer_options(
+    size: tuple[int, int],
+    samples: int,
+    memory_budget: int | None,
+    cache_blocks: int,
+    **capabilities: bool,
+) -> dict[str, Any]:
+    """Arguments of Renderer as isowave::RendererOptions, checked."""
+    width, height = size_of(size)
+    return {
+        "width": width,
+        "height": height,
+        "samples": whole("samples", samples),
+        "memory_budget": (
+            None if memory_budget is None else whole("memory_budget", memory_budget, 2**64 - 1)
+        ),
+        "cache_blocks": whole("cache_blocks", cache_blocks),
+        **{f"with_{name}": flag(name, value) for name, value in capabilities.items()},
+    }
 
 
 def warn_of_isovalue(core: _core.Volume | _core.Renderer, isovalue: float) -> None:
@@ -39,9 +56,7 @@ def warn_of_isovalue(core: _core.Volume | _core.Renderer, isovalue: float) -> No
     warnings.warn(notice, RuntimeWarning, stacklevel=level)
 
 
-def draw(
-    renderer: _core.Renderer, request: Request, interrupts: bool = True
-) -> dict[str, Any]:
+def draw(renderer: _core.Renderer, request: Request, interrupts: bool = True) -> dict[str, Any]:
     """The frame's arrays. interrupts: Ctrl-C is looked for after each pass."""
     on_pass = request.on_pass
 
@@ -55,35 +70,9 @@ def draw(
     return renderer.render(request.for_core(), watched, interrupts and is_main)
 
 
-def positions_of(volume: _core.Volume, positions: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
+def positions_of(volume: Voxels, positions: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
     """World positions in float32, if that holds them."""
-    return positions.astype(np.float32) if volume.float32_positions else positions
-
-
-def cast_rays(
-    renderer: _core.Renderer,
-    volume: _core.Volume,
-    rays: npt.ArrayLike,
-    isovalue: float,
-    normals: str,
-) -> dict[str, npt.NDArray[Any]]:
-    """See Volume.cast_rays()."""
-    try:
-        array = np.ascontiguousarray(rays, np.float64)
-    except (TypeError, ValueError):
-        raise refuse("rays", rays, "numbers, (..., 6): origin, direction") from None
-    if array.ndim == 0 or array.shape[-1] != 6:
-        raise ValueError(f"rays of shape {array.shape}: the last axis has 6: origin, direction")
-    found = renderer.cast_rays(
-        array.reshape(-1, 6), number("isovalue", isovalue), checked_normals(normals)
-    )
-    lead = array.shape[:-1]
-    return {
-        "t_hit": found["depth"].reshape(lead),
-        "normals": found["normals"].reshape(*lead, 3),
-        "position": positions_of(volume, found["positions"]).reshape(*lead, 3),
-        "cell": found["cells"][..., ::-1].reshape(*lead, 3),
-    }
+    return positions.astype(np.float32) if volume._core.float32_positions else positions
 
 
 class Renderer:
@@ -132,34 +121,22 @@ class Renderer:
         profiling: bool = False,
         quick: bool = False,
     ) -> None:
-        self.volume = volume
-        self.size = size_of(size)
-        samples = whole("samples", samples)
-        self.max_rays = self.size[0] * self.size[1] * samples**2
-        self._can = {
-            "levels": flag("levels", levels),
-            "bounds": flag("bounds", bounds),
-            "time_budget": flag("time_budget", time_budget),
-            "rays": flag("rays", rays),
-        }
-        self._volume = volume._core
-        self._iterating: int | None = None  # the thread that looks at a picture of passes()
-        self._core = _core.device_renderer(
-            "" if device is None else str(device),
-            volume._core,
-            {
-                "width": self.size[0],
-                "height": self.size[1],
-                "samples": samples,
-                "memory_budget": bytes_of(memory_budget),
-                "cache_blocks": whole("cache_blocks", cache_blocks),
-                **{f"with_{name}": can for name, can in self._can.items()},
-                "profiling": flag("profiling", profiling),
-                "quick": flag("quick", quick),
-            },
-        )
+        can = {"levels": levels, "bounds": bounds, "time_budget": time_budget, "rays": rays}
+        options = renderer_options(size, samples, memory_budget, cache_blocks, **can)
+        options |= {"profiling": flag("profiling", profiling), "quick": flag("quick", quick)}
+        name = "" if device is None else str(device)
+        self._hold(volume, _core.device_renderer(name, volume._core, options), size_of(size), can)
+        self.max_rays = self.size[0] * self.size[1] * options["samples"] ** 2
         if notice := self._core.device["notice"]:
             warnings.warn(notice, RuntimeWarning, stacklevel=2)
+
+    def _hold(
+        self, volume: Voxels, core: _core.Renderer, size: tuple[int, int], can: dict[str, bool]
+    ) -> None:
+        """can: what frames may ask for, by the arguments of the constructor."""
+        self.volume, self.size = volume, size
+        self._core, self._can = core, can
+        self._iterating: int | None = None  # the thread that looks at a picture of passes()
 
     @property
     def device(self) -> dict[str, Any]:
@@ -279,10 +256,10 @@ class Renderer:
         # On a GPU, frames end sooner than a person presses Ctrl-C, and looking for it after each
         # pass would cost time.
         interrupts = self.device["type"] != "gpu"
-        warn_of_isovalue(self._volume, request.isovalue)
+        warn_of_isovalue(self._core, request.isovalue)
         frame = draw(self._core, request, interrupts)
         if "positions" in frame:
-            frame["positions"] = positions_of(self._volume, frame["positions"])
+            frame["positions"] = positions_of(self.volume, frame["positions"])
         return Image(frame, request)
 
     def _completed(self, request: Request) -> Request:
@@ -297,8 +274,23 @@ class Renderer:
         self._check_turn()
         if not self._can["rays"]:
             raise _core.Error("cast_rays needs a renderer that was made with rays=True")
-        warn_of_isovalue(self._volume, number("isovalue", isovalue))
-        return cast_rays(self._core, self._volume, rays, isovalue, normals)
+        warn_of_isovalue(self._core, number("isovalue", isovalue))
+        try:
+            array = np.ascontiguousarray(rays, np.float64)
+        except (TypeError, ValueError):
+            raise refuse("rays", rays, "numbers, (..., 6): origin, direction") from None
+        if array.ndim == 0 or array.shape[-1] != 6:
+            raise ValueError(f"rays of shape {array.shape}: the last axis has 6: origin, direction")
+        found = self._core.cast_rays(
+            array.reshape(-1, 6), number("isovalue", isovalue), normals_of(normals)
+        )
+        lead = array.shape[:-1]
+        return {
+            "t_hit": found["depth"].reshape(lead),
+            "normals": found["normals"].reshape(*lead, 3),
+            "position": positions_of(self.volume, found["positions"]).reshape(*lead, 3),
+            "cell": found["cells"][..., ::-1].reshape(*lead, 3),
+        }
 
     def __repr__(self) -> str:
         width, height = self.size
@@ -356,3 +348,17 @@ class Renderer:
             # Any thread may have dropped the iterator, and when Python ends the frame is over.
             if thread is not threading.current_thread() and not _core.is_ending():
                 thread.join()
+
+
+def host_renderer(volume: Voxels) -> Renderer:
+    """A Renderer that draws on the host, full detail, in a quarter of its memory at most.
+
+    Raises
+    ------
+    Error
+        The memory is not enough.
+    """
+    renderer = Renderer.__new__(Renderer)
+    can = {name: name == "rays" for name in CAPABILITIES}
+    renderer._hold(volume, _core.host_renderer(volume._core, 0), (1280, 720), can)
+    return renderer

@@ -72,7 +72,6 @@ class Request:
         if unknown:
             listed = ", ".join(sorted(unknown))
             raise ValueError(f"outputs {listed}: there are {', '.join(KNOWN_OUTPUTS)}")
-        checked_normals(self.normals)
         checked = {
             "isovalue": number("isovalue", self.isovalue),
             "camera": None if self.camera is None else camera_of(self.camera),
@@ -80,6 +79,7 @@ class Request:
             "samples": whole("samples", self.samples),
             "color": None if self.color is None else color_of(self.color),
             "background": None if self.background is None else color_of(self.background),
+            "normals": normals_of(self.normals),
             "outputs": outputs,
             "max_error": optional("max_error", self.max_error),
             "voxel_pixels": number("voxel_pixels", self.voxel_pixels),
@@ -153,7 +153,7 @@ def camera_of(camera: Any) -> Camera:
     )
 
 
-def checked_normals(normals: str) -> str:
+def normals_of(normals: str) -> str:
     if normals not in ("smooth", "cell"):
         raise ValueError(f"normals {normals!r}: give 'smooth' or 'cell'")
     return normals

@@ -23,8 +23,8 @@ from isowave._mesh import Mesh
 from isowave._renderer import (
     CAPABILITIES,
     Renderer,
-    cast_rays,
     draw,
+    host_renderer,
     positions_of,
     warn_of_isovalue,
 )
@@ -80,7 +80,7 @@ class Volume(Voxels):
         self._lock = Turns()
         self._renderer: Renderer | None = None
         self._made_with: dict[str, Any] = {}
-        self._host: _core.Renderer | None = None
+        self._host: Renderer | None = None
 
     def __reduce__(self) -> tuple[Callable[..., Volume], tuple[Any, ...]]:
         if self._file is not None:
@@ -177,9 +177,9 @@ class Volume(Voxels):
                 self._renderer = Renderer(self, size=largest, quick=True, **wanted)
         return self._renderer
 
-    def _host_renderer(self) -> _core.Renderer:
+    def _host_renderer(self) -> Renderer:
         if self._host is None:
-            self._host = _core.host_renderer(self._core, 0)
+            self._host = host_renderer(self)
         return self._host
 
     def cast_rays(
@@ -215,13 +215,11 @@ class Volume(Voxels):
             nothing is hit. cell: (..., 3), (z, y, x) of the voxel at the cell's lowest corner.
         """
         with self._lock:
-            if device is None and self._fits_host():
-                host = self._host_renderer()
-            else:
+            if device is not None or not self._fits_host():
                 renderer = self._renderer_for({"device": device, "rays": True})
                 return renderer.cast_rays(rays, isovalue, normals=normals)
-        warn_of_isovalue(self._core, number("isovalue", isovalue))
-        return cast_rays(host, self._core, rays, isovalue, normals)
+            renderer = self._host_renderer()
+        return renderer.cast_rays(rays, isovalue, normals=normals)
 
     def _fits_host(self) -> bool:
         try:
@@ -276,7 +274,7 @@ class Volume(Voxels):
             0 if memory_budget is None else whole("memory_budget", memory_budget, 2**64 - 1),
             function("progress", progress),
         )
-        places = positions_of(self._core, found["vertices"])
+        places = positions_of(self, found["vertices"])
         return Mesh(places, found["faces"], found["normals"] if normals else None)
 
     def verify(
@@ -303,7 +301,7 @@ class Volume(Voxels):
             renderer.wait()
             image = renderer.draw(request)
             host = self._host_renderer()
-        twin = draw(host, replace(request, camera=image.camera))
+        twin = draw(host._core, replace(request, camera=image.camera))
         assert image.rgb is not None and image.depth is not None and image.normals is not None
         differing = {
             "differing_pixels": int((image.rgb != twin["picture"]).any(axis=-1).sum()),

@@ -145,7 +145,7 @@ def test_a_renderer_is_not_used_in_its_own_on_pass(volume):
     renderer = volume.renderer(size=SIZE, rays=True)
     rays = np.ones((1, 6))
     volume.render(6, size=SIZE)
-    host = isowave._core.HostRenderer(volume._core, 0)
+    host = isowave._core.host_renderer(volume._core, 0)
     calls = [
         (renderer, lambda: renderer.camera(6)),
         (renderer, lambda: renderer.render(6)),

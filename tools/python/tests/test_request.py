@@ -54,7 +54,7 @@ def test_arguments_reach_the_request_by_their_names(monkeypatch: pytest.MonkeyPa
         "samples": 2,
         "surface": (1, 0.5, 0),
         "background": (0, 0.5, 1),
-        "smooth_normals": False,
+        "normals": "cell",
         "voxel_pixels": 2,
         "voxel_error": 3,
         "max_surface_error": 1,

@@ -14,7 +14,7 @@ from PIL import Image
 
 import isowave
 from isowave._request import Request
-from isowave.viewer.host import make_host
+from isowave.viewer.renderers import make_host
 from isowave.viewer.scene import Scene
 from isowave.viewer.session import Session
 

@@ -323,7 +323,7 @@ def test_connections_without_the_token_never_keep_out_those_with_it(sent: bytes)
 
 def test_thousands_of_connections_in_turn_leave_nothing(server: Server) -> None:
     files = len(os.listdir("/proc/self/fd"))
-    for i in range(2000):
+    for i in range(1100):  # more than a process may have open
         with dialling(server) as raw:
             raw.sendall(b"GET / HT"[: i % 9])
     assert works(server)
@@ -475,13 +475,13 @@ def receive_now(socket: ClientConnection) -> dict[str, Any]:
     return json.loads(message) if isinstance(message, str) else {"type": "picture"}
 
 
-def test_100_reconnects_leave_nothing() -> None:
+def test_reconnects_leave_nothing() -> None:
     volume = FakeVolume()
     with serving(volume) as server:
         assert works(server)
         gc.collect()
         threads, files = threading.active_count(), len(os.listdir("/proc/self/fd"))
-        for i in range(100):
+        for i in range(30):
             with talking(server) as socket:
                 socket.send(wish_text(1, i))
                 if i % 3 == 0:

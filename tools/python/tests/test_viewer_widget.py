@@ -3,7 +3,6 @@ and Voila."""
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import re
@@ -12,7 +11,7 @@ import shutil
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -158,9 +157,11 @@ view(FakeVolume(), isovalue=80, title="ball", height=420)
 """
 
 
-@contextlib.contextmanager
-def served(folder: Path, path: str) -> Iterator[str]:
-    """The URL of a notebook that shows the widget, at that path of a JupyterLab."""
+@pytest.fixture(scope="module")
+def jupyter(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[str], str]]:
+    """The URL of a path of a JupyterLab with a notebook that shows the widget, ball.ipynb."""
+    pytest.importorskip("jupyterlab")
+    folder = tmp_path_factory.mktemp("jupyter")
     paths = [str(Path(__file__).parent), str(Path(isowave.__file__).parents[1])]
     cell = NOTEBOOK_CELL.format(paths=paths)
     kernel = {"kernelspec": {"name": "python3", "display_name": "Python 3"}}
@@ -186,15 +187,15 @@ def served(folder: Path, path: str) -> Iterator[str]:
                 break
             threading.Event().wait(0.1)
         assert url, log.read_text()
-        yield f"http://127.0.0.1:{url[1]}/{path}?token={token}"
+        yield lambda path: f"http://127.0.0.1:{url[1]}/{path}?token={token}"
     finally:
         process.terminate()
         process.wait(TIMEOUT)
 
 
-@contextlib.contextmanager
-def page_at(url: str) -> Iterator[Any]:
-    """In Chromium."""
+@pytest.fixture(scope="module")
+def page() -> Iterator[Any]:
+    """Of Chromium."""
     playwright = pytest.importorskip("playwright.sync_api")
     chromium = os.environ.get("ISOWAVE_CHROMIUM") or shutil.which("chromium")
     if not chromium:
@@ -203,7 +204,6 @@ def page_at(url: str) -> Iterator[Any]:
         browser = started.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
         page = browser.new_page(viewport={"width": 1280, "height": 800})
         page.set_default_timeout(1000 * TIMEOUT)
-        page.goto(url)
         yield page
         browser.close()
 
@@ -230,25 +230,24 @@ def keep_screenshot(page: Any, name: str) -> None:
         page.screenshot(path=f"{os.environ['ISOWAVE_SCREENSHOTS']}/{name}.png")
 
 
-def test_in_jupyterlab(tmp_path: Path) -> None:
-    pytest.importorskip("jupyterlab")
-    with served(tmp_path, "lab/tree/ball.ipynb") as url, page_at(url) as page:
-        page.get_by_text("| Idle").wait_for()  # the kernel's status; before, keys are lost
-        page.locator(".jp-Notebook .cm-content").first.click()
-        page.keyboard.press("Shift+Enter")
-        drag(page)
-        # Keys are the picture's, not the notebook's: 0 0 would restart the kernel.
-        page.get_by_role("application").focus()
-        page.keyboard.press("0")
-        page.keyboard.press("0")
-        page.keyboard.press("ArrowLeft")
-        assert page.get_by_role("dialog").count() == 0
-        keep_screenshot(page, "jupyterlab")
+def test_in_jupyterlab(jupyter: Callable[[str], str], page: Any) -> None:
+    page.goto(jupyter("lab/tree/ball.ipynb"))
+    page.get_by_text("| Idle").wait_for()  # the kernel's status; before, keys are lost
+    page.locator(".jp-Notebook .cm-content").first.click()
+    page.keyboard.press("Shift+Enter")
+    drag(page)
+    # Keys are the picture's, not the notebook's: 0 0 would restart the kernel.
+    page.get_by_role("application").focus()
+    page.keyboard.press("0")
+    page.keyboard.press("0")
+    page.keyboard.press("ArrowLeft")
+    assert page.get_by_role("dialog").count() == 0
+    keep_screenshot(page, "jupyterlab")
 
 
-def test_in_voila(tmp_path: Path) -> None:
+def test_in_voila(jupyter: Callable[[str], str], page: Any) -> None:
     """A page without JupyterLab's front end."""
     pytest.importorskip("voila")
-    with served(tmp_path, "voila/render/ball.ipynb") as url, page_at(url) as page:
-        drag(page)
-        keep_screenshot(page, "voila")
+    page.goto(jupyter("voila/render/ball.ipynb"))
+    drag(page)
+    keep_screenshot(page, "voila")

@@ -7,6 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
+from isowave._levels import Voxels
+from isowave._renderer import host_renderer
+
 from .interfaces import RendererLike, VolumeLike
 from .pictures import Extent
 from .protocol import TokenBucket, Wish, first_line
@@ -246,3 +249,8 @@ class Renderers:
             if not is_over():
                 self.host = host
                 self._changed.notify_all()
+
+
+def make_host(volume: VolumeLike) -> RendererLike | None:
+    """A renderer of the host for a volume of isowave's; None for others."""
+    return host_renderer(volume) if isinstance(volume, Voxels) else None

@@ -26,11 +26,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import messages
-from .host import make_host
 from .interfaces import ImageLike, ProgressLike, RendererLike, VolumeLike
 from .pictures import Extent, Stopped, dividing_value, encode_jpeg, encode_png, share_within
 from .protocol import MAX_FLOAT32, MAX_RAYS, Ack, Budget, Message, Wish
-from .renderers import RendererOptions, Renderers
+from .renderers import RendererOptions, Renderers, make_host
 from .turns import Client, Frame, Post, Stage, Turns
 
 PASS_SECONDS: Final = 0.06  # between pictures of passes
@@ -292,6 +291,8 @@ class Scene:
             ambient=extent.ambient,
             on_pass=lambda so_far: self._on_pass(frame, so_far),
         )
+        if frame.by_host:  # it draws full detail, and is not interrupted by a time
+            request = replace(request, max_error=None, time_budget=None)
         image = renderer.draw(request)
         if frame.stopped:
             self._show_what_there_is(frame, image)

@@ -1,0 +1,444 @@
+// isowave._core: devices and renderers.
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <thread>
+#include <type_traits>
+
+#include "module.hpp"
+
+namespace isowave_python {
+
+namespace {
+
+nb::dict device_dict(const isowave::DeviceInfo &info) {
+  nb::dict result;
+  result["index"] = info.index;
+  result["name"] = info.name;
+  result["vendor"] = info.vendor;
+  result["platform"] = info.platform;
+  result["driver"] = info.driver;
+  result["type"] = info.type;
+  result["memory_bytes"] = info.memory_bytes;
+  return result;
+}
+
+nb::tuple camera_tuple(const isowave::Camera &camera) {
+  const auto vector = [](const Vector3 &v) { return nb::make_tuple(v[0], v[1], v[2]); };
+  return nb::make_tuple(vector(camera.eye), vector(camera.at), vector(camera.up),
+                        camera.fovy_degrees);
+}
+
+/// The picture so far; only while the callback that got it is at work. Threads take turns.
+class PassView {
+  /// Who has the lock never waits for the GIL.
+  template <class Look>
+  auto look(const Look &at) const {
+    const WithoutGil no_gil;
+    const std::lock_guard lock(mutex_);
+    if (progress_ == nullptr) throw Error("this pass is over: look at it within on_pass");
+    return at(*progress_);
+  }
+
+ public:
+  explicit PassView(const isowave::Progress &progress) : progress_(&progress) {}
+
+  std::uint32_t passes() const {
+    return look([](const isowave::Progress &progress) { return progress.passes(); });
+  }
+  double completed_percent() const {
+    return look([](const isowave::Progress &progress) { return progress.completed_percent(); });
+  }
+  nb::object picture() const {
+    isowave::ImageSize size;
+    std::vector<std::uint8_t> pixels = look([&](const isowave::Progress &progress) {
+      size = progress.size();
+      return progress.picture();
+    });
+    return to_numpy<std::uint8_t>(std::move(pixels), {size.height, size.width, 3});
+  }
+  /// The callback is over. Waits for pictures of other threads.
+  void end() {
+    const WithoutGil no_gil;
+    const std::lock_guard lock(mutex_);
+    progress_ = nullptr;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  const isowave::Progress *progress_;
+};
+
+nb::dict statistics_dict(const isowave::FrameStatistics &statistics) {
+  nb::dict result;
+  result["passes"] = statistics.passes;
+  result["rays"] = statistics.rays;
+  result["hits"] = statistics.hits;
+  result["decoded_blocks"] = statistics.decoded_blocks;
+  result["normals_passes"] = statistics.normals_passes;
+  result["normals_decoded_blocks"] = statistics.normals_decoded_blocks;
+  result["normals_ms"] = statistics.normals_ms;
+  result["ambient_passes"] = statistics.ambient_passes;
+  result["ambient_ms"] = statistics.ambient_ms;
+  result["uploaded_bytes"] = statistics.uploaded_bytes;
+  result["first_level"] = statistics.first_level;
+  result["last_level"] = statistics.last_level;
+  result["total_ms"] = statistics.total_ms;
+  result["cancelled"] = statistics.cancelled;
+  result["complete"] = statistics.complete;
+  result["errors_are_stated"] = statistics.errors_are_stated;
+  result["stage_ms"] = statistics.stage_ms;
+  return result;
+}
+
+/// Of frame.hits: cells [rows][columns][3] and levels [rows][columns].
+void add_hits(const isowave::Frame &frame, nb::dict &result) {
+  std::vector<Index3> cells;
+  std::vector<std::uint32_t> levels;
+  for (const isowave::Hit &hit : frame.hits) {
+    cells.push_back(hit.cell);
+    levels.push_back(hit.level);
+  }
+  result["cells"] = to_numpy<std::uint32_t>(std::move(cells), {frame.rows, frame.columns, 3});
+  result["levels"] = to_numpy<std::uint32_t>(std::move(levels), {frame.rows, frame.columns});
+}
+
+/// is_of_rays: arrays are there even if they are empty.
+nb::dict frame_dict(isowave::Frame &&frame, bool is_of_rays = false) {
+  nb::dict result;
+  const std::size_t rows = frame.rows, columns = frame.columns;
+  if (!frame.picture.empty()) {
+    result["picture"] =
+        to_numpy<std::uint8_t>(std::move(frame.picture), {frame.size.height, frame.size.width, 3});
+  }
+  if (is_of_rays || !frame.depth.empty())
+    result["depth"] = to_numpy<float>(std::move(frame.depth), {rows, columns});
+  if (is_of_rays || !frame.normals.empty())
+    result["normals"] = to_numpy<float>(std::move(frame.normals), {rows, columns, 3});
+  if (is_of_rays || !frame.positions.empty())
+    result["positions"] = to_numpy<double>(std::move(frame.positions), {rows, columns, 3});
+  if (!frame.bounds.empty())
+    result["bounds"] = to_numpy<float>(std::move(frame.bounds), {rows, columns});
+  if (is_of_rays || !frame.hits.empty()) add_hits(frame, result);
+  nb::dict statistics = statistics_dict(frame.statistics);
+  if (frame.detail) {
+    nb::dict detail;
+    detail["voxel_pixels"] = frame.detail->voxel_pixels;
+    detail["voxel_error"] = frame.detail->voxel_error;
+    detail["reachable"] = frame.detail->reachable;
+    detail["advice"] = frame.detail->advice;
+    statistics["detail"] = detail;
+  }
+  result["statistics"] = statistics;
+  return result;
+}
+
+/// [count][6]
+using RayArray = nb::ndarray<double, nb::ro, nb::shape<-1, 6>, nb::c_contig>;
+
+/// "smooth", "cell"; of a request's enums, Python sets this one alone.
+isowave::Normals normals_of(const std::string &name) {
+  if (name != "smooth" && name != "cell") throw Error("normals '" + name + "': smooth or cell");
+  return name == "smooth" ? isowave::Normals::kSmooth : isowave::Normals::kCell;
+}
+
+isowave::FrameRequest request_of(const nb::dict &options) {
+  isowave::FrameRequest request;
+  const auto get = reader_of(options);
+  isowave::for_each_field(request, [&](const char *name, auto &field) {
+    using Field = std::decay_t<decltype(field)>;
+    if constexpr (std::is_same_v<Field, isowave::Normals>) {
+      std::string text = "smooth";
+      get(name, text);
+      field = normals_of(text);
+    } else if constexpr (!std::is_enum_v<Field>) {
+      get(name, field);
+    }
+  });
+  return request;
+}
+
+isowave::RendererOptions renderer_options_of(const nb::dict &options) {
+  isowave::RendererOptions result;
+  const auto get = reader_of(options);
+  get("width", result.largest.width);
+  get("height", result.largest.height);
+  get("samples", result.largest.samples);
+  get("memory_budget", result.memory_budget);
+  get("cache_blocks", result.cache_blocks);
+  get("with_levels", result.with_levels);
+  get("with_bounds", result.with_bounds);
+  get("with_time_budget", result.with_time_budget);
+  get("with_rays", result.with_rays);
+  return result;
+}
+
+/// A renderer that is no longer wanted while it is being made. A thread of its own waits for the
+/// kernel that is being compiled. A process that ends before leaves the compiler as it is.
+void abandon(std::unique_ptr<isowave::Renderer> renderer) {
+  static std::atomic<int> num_abandoned = 0;
+  static const int ends_at_once = ::on_exit(
+      [](int status, void *) {
+        if (num_abandoned == 0) return;
+        std::fflush(nullptr);
+        ::_exit(status);
+      },
+      nullptr);
+  static_cast<void>(ends_at_once);
+  renderer->give_up();
+  ++num_abandoned;
+  std::thread([left = std::move(renderer)]() mutable {
+    left.reset();
+    --num_abandoned;
+  }).detach();
+}
+
+/// A Python object with rank, size, local_rank, all_gather() and reduce(): see _bricks.py.
+class PyProcesses : public isowave::Processes {
+ public:
+  explicit PyProcesses(const nb::object &object)
+      : object_(object),
+        rank_(nb::cast<std::uint32_t>(object.attr("rank"))),
+        size_(nb::cast<std::uint32_t>(object.attr("size"))),
+        local_rank_(nb::cast<std::uint32_t>(object.attr("local_rank"))) {}
+
+  std::uint32_t rank() const override { return rank_; }
+  std::uint32_t size() const override { return size_; }
+  std::uint32_t local_rank() const override { return local_rank_; }
+  std::vector<std::string> all_gather(const std::string &bytes) override {
+    std::vector<std::string> all;
+    call([&] {
+      for (const nb::handle each :
+           object_.attr("all_gather")(nb::bytes(bytes.data(), bytes.size())))
+        all.emplace_back(nb::cast<nb::bytes>(each).c_str(), nb::cast<nb::bytes>(each).size());
+    });
+    return all;
+  }
+  void reduce(std::span<std::uint64_t> words, Reduction how, bool for_all) override {
+    call([&] {
+      const bool in_halves = how == Reduction::kMinOfHalves;
+      const nb::ndarray<nb::numpy> array(
+          words.data(), {(in_halves ? 2 : 1) * words.size()}, nb::handle(), {},
+          in_halves ? nb::dtype<std::uint32_t>() : nb::dtype<std::uint64_t>());
+      object_.attr("reduce")(nb::cast(array, nb::rv_policy::reference), how != Reduction::kOr,
+                             for_all);
+    });
+  }
+
+  /// Calls work(callbacks), which calls these, without the GIL, and raises what they have raised.
+  template <class Work>
+  auto without_gil(const Work &work) {
+    callbacks_ = {};
+    return callbacks_.without_gil([&] { return work(callbacks_); });
+  }
+
+ private:
+  template <class Work>
+  void call(const Work &work) {
+    if (!callbacks_.run(work)) throw Stopped();
+  }
+
+  nb::object object_;
+  std::uint32_t rank_, size_, local_rank_;
+  Callbacks callbacks_;
+};
+
+/// Calls on_pass, if there is one, with a view of the picture so far. Returns whether the frame
+/// goes on.
+bool show_pass(Callbacks &callbacks, const std::optional<nb::callable> &on_pass,
+               const isowave::Progress &progress) {
+  bool wanted = true;
+  const bool goes_on = callbacks.run([&] {
+    if (!on_pass) return;
+    auto *const view = new PassView(progress);
+    const nb::object owner = nb::cast(view, nb::rv_policy::take_ownership);
+    try {
+      wanted = nb::cast<bool>(call(*on_pass, owner));
+    } catch (...) {
+      view->end();
+      throw;
+    }
+    view->end();
+  });
+  return goes_on && wanted;
+}
+
+/// Any of the library's renderers.
+class PyRenderer {
+  /// Calls work(callbacks) without the GIL, and raises what a callback has raised.
+  template <class Work>
+  auto without_gil(const Work &work) {
+    if (processes_) return processes_->without_gil(work);
+    Callbacks callbacks;
+    return callbacks.without_gil([&] { return work(callbacks); });
+  }
+
+ public:
+  using Owned = std::unique_ptr<isowave::Renderer, DestroyWithoutGil<isowave::Renderer>>;
+
+  /// Draws on a device; with the option "quick", on the host until kernels are compiled.
+  static std::unique_ptr<PyRenderer> on_device(const std::string &selector, const PyVolume &volume,
+                                               const nb::dict &options) {
+    const isowave::RendererOptions wanted = renderer_options_of(options);
+    const auto get = reader_of(options);
+    isowave::DeviceOptions device_options;
+    get("profiling", device_options.profiling);
+    bool quick = false;
+    get("quick", quick);
+    auto result = std::make_unique<PyRenderer>();
+    {
+      const WithoutGil no_gil;
+      result->renderer_.reset(new isowave::Renderer(isowave::make_quick_renderer(
+          isowave::open_device(selector, device_options), volume.volume, wanted)));
+      PythonsEnd::instance().begin_making(*result->renderer_);
+    }
+    if (quick) return result;
+    try {
+      result->wait();
+    } catch (...) {
+      PythonsEnd::instance().end_making(*result->renderer_);
+      if (!result->ready())
+        abandon(std::unique_ptr<isowave::Renderer>(result->renderer_.release()));
+      throw;
+    }
+    return result;
+  }
+  static std::unique_ptr<PyRenderer> on_host(const PyVolume &volume, std::uint64_t memory_limit) {
+    auto result = std::make_unique<PyRenderer>();
+    const WithoutGil no_gil;
+    result->renderer_.reset(new isowave::Renderer(
+        isowave::make_host_renderer(volume.volume, {.memory_limit = memory_limit})));
+    return result;
+  }
+  static std::unique_ptr<PyRenderer> of_team(const nb::object &processes,
+                                             const std::filesystem::path &path,
+                                             const nb::dict &compression, const nb::dict &options) {
+    isowave::BrickOptions wanted;
+    const auto get = reader_of(options);
+    get("device", wanted.device);
+    get("bricks", wanted.bricks);
+    wanted.renderer = renderer_options_of(options);
+    const isowave::Compression how = compression_of(compression);
+    auto result = std::make_unique<PyRenderer>();
+    result->processes_ = std::make_unique<PyProcesses>(processes);
+    result->without_gil([&](Callbacks &) {
+      result->renderer_.reset(new isowave::Renderer(
+          isowave::make_team_renderer(*result->processes_, path, how, {}, wanted)));
+    });
+    return result;
+  }
+
+  PyRenderer() = default;
+  ~PyRenderer() {
+    if (renderer_) PythonsEnd::instance().end_making(*renderer_);
+  }
+  PyRenderer(const PyRenderer &) = delete;
+  PyRenderer &operator=(const PyRenderer &) = delete;
+
+  /// on_pass     called after each pass with a PassView; False from it ends the frame
+  /// interrupts  signals are looked for after each pass, which waits for that
+  nb::dict render(const nb::dict &options, const std::optional<nb::callable> &on_pass,
+                  bool interrupts) {
+    isowave::FrameRequest request = request_of(options);
+    if (!renderer_->ready_for(request)) wait();
+    isowave::Frame frame = without_gil([&](Callbacks &callbacks) {
+      if (on_pass || interrupts) {
+        request.on_pass = [&](const isowave::Progress &progress) {
+          return show_pass(callbacks, on_pass, progress);
+        };
+      }
+      return renderer_->render(request);
+    });
+    return frame_dict(std::move(frame));
+  }
+
+  /// rays [count][6]: origin and direction.
+  nb::dict cast_rays(const RayArray &rays, double isovalue, const std::string &normals) {
+    static_assert(sizeof(isowave::Ray) == 6 * sizeof(double));
+    const auto *first = reinterpret_cast<const isowave::Ray *>(rays.data());
+    return frame_dict(
+        without_gil([&](Callbacks &) {
+          return renderer_->cast_rays({first, rays.shape(0)}, isovalue, normals_of(normals));
+        }),
+        true);
+  }
+
+  nb::tuple camera(double isovalue, std::uint32_t width, std::uint32_t height) {
+    return camera_tuple(without_gil([&](Callbacks &) {
+      return renderer_->camera(isovalue, isowave::ImageSize{width, height, 1});
+    }));
+  }
+
+  bool ready() const { return renderer_->ready(); }
+  /// Until the device's renderer is made. Ctrl-C ends the wait.
+  void wait() const {
+    for (std::chrono::microseconds pause{200}; !renderer_->ready();) {
+      {
+        const WithoutGil no_gil;
+        std::this_thread::sleep_for(pause);
+      }
+      if (PyErr_CheckSignals() != 0) throw nb::python_error();
+      pause = std::min(pause * 5 / 4, std::chrono::microseconds{20'000});
+    }
+    const WithoutGil no_gil;
+    renderer_->wait();
+  }
+  nb::dict device() const {
+    nb::dict result = device_dict(renderer_->device_info());
+    result["notice"] = renderer_->device() ? renderer_->device()->notice() : std::string();
+    return result;
+  }
+  const isowave::Renderer &renderer() const { return *renderer_; }
+
+ private:
+  std::unique_ptr<PyProcesses>
+      processes_;  ///< a team's; the renderer does not call it when it goes
+  Owned renderer_;
+};
+
+std::vector<nb::dict> list_devices() {
+  std::vector<isowave::DeviceInfo> infos;
+  {
+    const WithoutGil no_gil;
+    infos = isowave::list_devices();
+  }
+  std::vector<nb::dict> result;
+  for (const isowave::DeviceInfo &info : infos) result.push_back(device_dict(info));
+  return result;
+}
+
+}  // namespace
+
+void add_renderers(nb::module_ &m) {
+  m.def("devices", &list_devices);
+  nb::class_<PassView>(m, "PassView")
+      .def_prop_ro("passes", &PassView::passes)
+      .def_prop_ro("completed_percent", &PassView::completed_percent)
+      .def("picture", &PassView::picture);
+  nb::class_<PyRenderer>(m, "Renderer")
+      .def("render", &PyRenderer::render, "request"_a, "on_pass"_a.none(), "interrupts"_a)
+      .def("cast_rays", &PyRenderer::cast_rays, "rays"_a, "isovalue"_a, "normals"_a)
+      .def("camera", &PyRenderer::camera, "isovalue"_a, "width"_a, "height"_a)
+      .def(
+          "isovalue_notice",
+          [](const PyRenderer &r, double isovalue) {
+            return r.renderer().isovalue_notice(isovalue);
+          },
+          "isovalue"_a)
+      .def("wait", &PyRenderer::wait)
+      .def_prop_ro("ready", &PyRenderer::ready)
+      .def_prop_ro("device", &PyRenderer::device)
+      .def_prop_ro("memory_bytes", [](const PyRenderer &r) { return r.renderer().memory_bytes(); })
+      .def_prop_ro("notices", [](const PyRenderer &r) { return r.renderer().notices(); })
+      .def_prop_ro("dims", [](const PyRenderer &r) { return r.renderer().grid().dims; })
+      .def_prop_ro("spacing", [](const PyRenderer &r) { return r.renderer().grid().spacing; })
+      .def_prop_ro("origin", [](const PyRenderer &r) { return r.renderer().grid().origin; })
+      .def_prop_ro("direction", [](const PyRenderer &r) { return r.renderer().grid().direction; });
+  m.def("device_renderer", &PyRenderer::on_device, "device"_a, "volume"_a, "options"_a);
+  m.def("host_renderer", &PyRenderer::on_host, "volume"_a, "memory_limit"_a);
+  m.def("team_renderer", &PyRenderer::of_team, "processes"_a, "path"_a, "compression"_a,
+        "options"_a);
+}
+
+}  // namespace isowave_python
