@@ -239,6 +239,7 @@ TEST(MemoryPlan, FirstSlotsAreForWhatAFrameNeeds) {
   constexpr std::uint64_t kRays = 1280 * 720;
   EXPECT_EQ(first_cache_slots(128 * 128 * 128, kRays), 12u * 128 * 128) << "of the volume";
   EXPECT_EQ(first_cache_slots(256 * 256 * 256, kRays), kRays / 8 * 5) << "of the picture";
+  EXPECT_EQ(first_cache_slots(128 * 128 * 128, kRays, true), 24u * 128 * 128) << "and of its hits";
   EXPECT_EQ(first_cache_slots(64 * 64 * 64, 800), 16'384u) << "not worth saving";
   EXPECT_EQ(first_cache_slots(16'384, kRays), 16'384u) << "all";
   EXPECT_EQ(first_cache_slots(27, kRays), 27u) << "all";
