@@ -406,7 +406,7 @@ TEST_P(GrowingCacheOnDevice, WhereMemoryIsShort) {
   }
 }
 
-/// Frames that were stopped have asked for blocks that nobody brought.
+/// Frames that were stopped have asked for blocks that were not brought.
 TEST_P(GrowingCacheOnDevice, AfterFramesThatWereStopped) {
   for (const std::size_t last : {1u, 2u, 5u}) {
     SCOPED_TRACE(last);
@@ -457,7 +457,7 @@ TEST_P(GrowingCacheOnDevice, WithRaysOfAnyOrigin) {
   EXPECT_GT(renderer.memory_plan().cache_slots, 32u);
 }
 
-/// Of a stream on the host, of several levels, there is more that depends on the slots.
+/// A stream on the host, with several levels, has more that depends on the slots.
 TEST_P(MemoryPlanOfLevelsOnDevice, CachesOfLevelsGrow) {
   const glm::uvec3 dims(40, 41, 42);
   ArrayReader reader(test::grid_info(dims), test::sample(dims, test::gyroid_field(10)));
