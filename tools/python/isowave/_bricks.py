@@ -27,7 +27,7 @@ Result = TypeVar("Result")
 
 
 class Processes:
-    """What the compiled part calls, of a communicator of mpi4py's."""
+    """A communicator of mpi4py's as the compiled part calls it."""
 
     def __init__(self, comm: Any) -> None:
         from mpi4py import MPI
@@ -53,7 +53,7 @@ class Processes:
             self._comm.Reduce(words, None, operation)
 
     def together(self, work: Callable[[], Result]) -> Result:
-        """What work() gives. Where it raises at one process, all raise, so that none waits."""
+        """The result of work(). If work() raises at one process, all raise, so that none waits."""
         error: Exception | None = None
         try:
             result = work()

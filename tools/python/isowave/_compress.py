@@ -51,7 +51,7 @@ def compression_options(
         "map_nan": None if map_nan is None else number("map_nan", map_nan),
         "no_data": None if no_data is None else number("no_data", no_data),
         "num_threads": whole("num_threads", num_threads),
-        # Where nothing bounds it, the error is measured: people ask.
+        # If nothing bounds the error, it is measured: people ask.
         "measure_error": not exact and tolerance is None and relative_tolerance is None,
     }
 
@@ -141,34 +141,34 @@ def compress(
         Refuse voxels that float32 does not hold. Without tolerance, relative_tolerance and rate,
         voxels keep all that float32 holds: integers below 2^24 and float32 have no error.
     spacing, origin
-        World units between voxels, and position of voxel (0, 0, 0); each (z, y, x). What the array
-        says itself (xarray, SimpleITK...) where None, else 1 and 0.
+        World units between voxels, and position of voxel (0, 0, 0); each (z, y, x). None: as the
+        array says itself (xarray, SimpleITK...), else 1 and 0.
     direction
         3 x 3; column a is the unit world direction (x, y, z) of index axis a, in the order x, y, z.
     levels
         Levels of detail, the volume itself among them; 0: all that it can have.
     map_nan
-        What replaces NaN and infinite voxels.
+        Replaces NaN and infinite voxels.
     no_data
         Voxels of this value have no data, as NaN voxels have none: no surface touches them. It is
         compared in the array's own type, and may be infinite; other infinite voxels are refused.
         If None, what the array says itself: the attributes _FillValue or missing_value of xarray
         and h5py, the fill value of zarr, h5py and tensorstore unless it is 0.
     fill_value
-        What replaces masked values of masked arrays; if None, they have no data.
+        Replaces masked values of masked arrays; if None, these have no data.
     path
         A .zfp file that the volume is written to, layer by layer, and opened from: then the result
         need not fit into memory. None: into memory.
     progress
         True for a bar (needs tqdm), False for none, or a function of (what, done), done from 0 to
-        1. None: a bar on a terminal or in a notebook, where tqdm is installed.
+        1. None: a bar on a terminal or in a notebook, if tqdm is installed.
     num_threads
         0: one per processor. The result is the same for any number.
 
     Raises
     ------
     Error, TypeError, ValueError
-        What cannot be compressed, in one line.
+        The array cannot be compressed; in one line.
     """
     source = as_source(
         array, spacing=spacing, origin=origin, direction=direction, fill_value=fill_value

@@ -25,8 +25,8 @@ class Image:
     rgb: npt.NDArray[np.uint8] | None  #: (height, width, 3)
     depth: npt.NDArray[np.float32] | None  #: distance from the eye [world units]; inf: no surface
     normals: npt.NDArray[np.float32] | None
-    """(rows, columns, 3), (x, y, z) in world space, of length 1, away from larger values; 0 where
-    there is no surface."""
+    """(rows, columns, 3), (x, y, z) in world space, of length 1, away from larger values; 0
+    without a surface."""
     position: npt.NDArray[np.float32] | npt.NDArray[np.float64] | None
     """(rows, columns, 3), world space; nan: no surface. float64 if float32 would lose more than
     1/4096 voxel, as it does far from the origin."""
@@ -90,7 +90,7 @@ class Image:
     def save(self, path: str | os.PathLike[str], *, alpha: bool = False) -> None:
         """Writes a .png file; whole, or not at all.
 
-        alpha: writes `rgba`, transparent where there is no surface, in place of `rgb`.
+        alpha: writes `rgba` in place of `rgb`; pixels without surface are transparent.
         """
         _core.save_png(self.rgba if flag("alpha", alpha) else self._rgb(), os.fsdecode(path))
 

@@ -23,10 +23,10 @@ Same = TypeVar("Same", bound="Voxels")
 
 
 class Level:
-    """The voxels of a level of detail, (z, y, x), as an array that is decoded where it is indexed.
+    """The voxels of a level of detail, (z, y, x), as an array that indexing decodes.
 
     Made by Volume.levels. Indexing takes what numpy takes, and gives numpy arrays of float32 (a
-    number, where all three indices are integers). Of a file, only the blocks of 4 x 4 x 4 voxels
+    number, if all three indices are integers). Of a file, only the blocks of 4 x 4 x 4 voxels
     that hold what is asked for are read and decoded; lists and arrays of indices decode what lies
     between the least and the largest, too. numpy.asarray(level) decodes everything;
     dask.array.from_array(level, chunks=...) decodes chunks when they are computed: with sides that
@@ -37,7 +37,7 @@ class Level:
     dtype = np.dtype(np.float32)
 
     def __init__(self, volume: Voxels, number: int, shape: Sequence[int] | None = None) -> None:
-        """shape: of the voxels from (0, 0, 0) on, where not all are wanted."""
+        """shape: voxels from (0, 0, 0) on; None: all."""
         self._volume, self._number = volume, number
         nz, ny, nx = reversed(volume._core.level_dims(number)) if shape is None else shape
         self._shape = (nz, ny, nx)
@@ -77,7 +77,7 @@ class Level:
         return voxels if dtype is None else voxels.astype(dtype, copy=False)
 
     def __dask_tokenize__(self) -> object:
-        """Whatever names dask's chunks of these voxels, and of no others."""
+        """A name for dask's chunks of these voxels, and of no others."""
         return self._volume.__dask_tokenize__(), self._number, self._shape
 
     def __repr__(self) -> str:
@@ -85,7 +85,7 @@ class Level:
         return f"<isowave.Level {self._number}, {shape} (z, y, x) {self.dtype}>"
 
     def _decode(self, ranges: Sequence[range]) -> npt.NDArray[np.float32]:
-        """Of ascending ranges within the shape."""
+        """The voxels of ascending ranges within the shape."""
         if not all(ranges):  # the library knows no empty regions
             return np.empty([len(r) for r in ranges], np.float32)
         z, y, x = ranges
@@ -98,7 +98,7 @@ class Level:
 
 
 class Voxels(Placed[_core.Volume]):
-    """A volume's voxels: an array of float32, (z, y, x), that is decoded where it is indexed."""
+    """A volume's voxels: an array of float32, (z, y, x), that indexing decodes."""
 
     ndim = 3
     dtype = Level.dtype  # of what indexing gives
@@ -114,18 +114,18 @@ class Voxels(Placed[_core.Volume]):
 
     @property
     def source_dtype(self) -> np.dtype[Any]:
-        """Of the voxels before compression."""
+        """Type of the voxels before compression."""
         return np.dtype(self._core.source_type)
 
     @property
     def value_range(self) -> tuple[float, float]:
-        """Least and largest voxel before compression; infinite where a file does not say."""
+        """Least and largest voxel before compression; infinite if a file does not say."""
         least, largest = self._core.value_range
         return least, largest
 
     @property
     def nbytes(self) -> int:
-        """Of the compressed voxels."""
+        """Size of the compressed voxels [bytes]."""
         return self._core.compressed_bytes
 
     @property
@@ -191,7 +191,7 @@ class Voxels(Placed[_core.Volume]):
         level
             Each has half the voxels of the last along each axis.
         region
-            What one would index an array of the level with: numpy.s_[10:20, :, 5]. Only the blocks
+            Key that would index an array of the level: numpy.s_[10:20, :, 5]. Only the blocks
             of 4 x 4 x 4 voxels that hold these voxels are decoded.
 
         Raises
@@ -229,13 +229,13 @@ class Voxels(Placed[_core.Volume]):
         return self
 
     def __dask_tokenize__(self) -> object:
-        """Whatever names dask's chunks of these voxels, and of no others."""
+        """A name for dask's chunks of these voxels, and of no others."""
         return self._token
 
     def histogram(self, bins: int = 256) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]]:
         """Counts [bins] and edges [bins + 1] of the values, as numpy.histogram gives them.
 
-        Of a large volume, of blocks that are spread over it: at most 2^24 voxels.
+        A large volume is sampled by blocks that are spread over it: at most 2^24 voxels.
         """
         bins = whole("bins", bins)
         values = self._core.sample(LARGEST_SAMPLE)

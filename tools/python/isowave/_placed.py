@@ -30,7 +30,7 @@ Core = TypeVar("Core", bound=_Grid)
 
 
 class Placed(Generic[Core]):
-    """What Volume and BrickRenderer, which has a brick of one, both say of the whole volume."""
+    """Shape and place of a whole volume: a Volume's own, or the one that bricks are parts of."""
 
     _core: Core
 

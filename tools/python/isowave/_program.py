@@ -15,7 +15,7 @@ VIEW = "  view                        Show a volume in a browser: isowave view -
 
 
 def main() -> int:
-    """Does not return where the program takes over the process."""
+    """Does not return if the program takes over the process."""
     arguments = sys.argv[1:]
     if arguments[:1] == ["view"]:
         return command.main(arguments[1:])

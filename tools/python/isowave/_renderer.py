@@ -81,15 +81,15 @@ class Renderer:
     Parameters
     ----------
     volume
-        What is drawn.
+        The volume to draw.
     device
         "gpu", "cpu", an index, or a part of a name; None: $ISOWAVE_DEVICE, else the first GPU.
     size, samples
         Largest picture (width, height), and rays of each of its pixels along each axis: frames may
         have as many rays, in any shape.
     memory_budget
-        Of device memory [bytes]; None: three quarters of it. Bounds all that is taken there. With a
-        budget all is taken at once; without, the cache begins small, and grows between frames.
+        Most device memory to take [bytes]; None: three quarters of it. With a budget all is taken
+        at once; without, the cache begins small, and grows between frames.
     cache_blocks
         Decoded blocks of 4^3 voxels that are kept, 8 and more; 0: as many as the budget allows, or,
         without one, as frames need.
@@ -100,7 +100,7 @@ class Renderer:
         Measures stages, for statistics["stage_ms"]; each pass is waited for.
     quick
         Returns at once: the device's renderer is made in a thread of its own, which may take half a
-        minute where a driver compiles kernels. Until it is ready, the host draws, with the same
+        minute if a driver compiles kernels. Until it is ready, the host draws, with the same
         bits; volumes that are too large for that, and what the host cannot draw (levels, bounds,
         time_budget), wait for the device.
     """
@@ -146,7 +146,7 @@ class Renderer:
 
     @property
     def memory_bytes(self) -> int:
-        """Of device memory that it holds; 0 before it is ready."""
+        """Device memory that the renderer holds; 0 before it is ready."""
         return self._core.memory_bytes
 
     @property
@@ -155,7 +155,7 @@ class Renderer:
         return self._core.ready
 
     def wait(self) -> None:
-        """Waits until the device draws. Raises Error where its renderer cannot be made."""
+        """Waits until the device draws. Raises Error if its renderer cannot be made."""
         self._core.wait()
 
     def camera(self, isovalue: float, size: tuple[int, int] | None = None) -> Camera:
@@ -200,12 +200,12 @@ class Renderer:
         samples
             Rays of a pixel along each axis, 1 to 8; colours are their mean.
         color, background
-            Of the surface and behind it: "#rrggbb", or red, green, blue from 0 to 1.
+            Colours of the surface and behind it: "#rrggbb", or red, green, blue from 0 to 1.
         normals
             "smooth": by central differences; "cell": of the trilinear field itself, which jump from
             cell to cell. They light the picture.
         outputs
-            Which of "rgb", "depth", "normals", "position", "bounds" are brought back.
+            Names of the arrays to bring back: "rgb", "depth", "normals", "position", "bounds".
         max_error
             Chooses the detail such that most pixels are within so many pixels of the surface of the
             volume before compression. Needs a renderer made with bounds=True.

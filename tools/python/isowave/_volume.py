@@ -61,8 +61,8 @@ class Turns:
 class Volume(Voxels):
     """A compressed volume. It cannot be changed, and threads may share it.
 
-    Made by compress() and open(). It is an array of float32, (z, y, x), that is decoded where it is
-    indexed: volume[10], volume[10:20, ::4, -1]. Level has more of that.
+    Made by compress() and open(). It is an array of float32, (z, y, x), that indexing decodes:
+    volume[10], volume[10:20, ::4, -1]. Level has more of that.
 
     A volume in a .zfp file is pickled as the file's path, so other processes of this machine open
     the same file. A volume in memory is pickled with its compressed voxels.
@@ -131,7 +131,7 @@ class Volume(Voxels):
         device
             "gpu", "cpu", an index, or a part of a name; None: $ISOWAVE_DEVICE, else the first GPU.
         memory_budget
-            Of device memory [bytes]; None: three quarters of it.
+            Most device memory to take [bytes]; None: three quarters of it.
         """
         request = Request(isovalue, camera, size, **more)
         return self.draw(request, device=device, memory_budget=memory_budget)
@@ -153,7 +153,7 @@ class Volume(Voxels):
             return self._renderer_for(wanted).draw(request)
 
     def _renderer_for(self, wanted: dict[str, Any]) -> Renderer:
-        """The kept renderer, or a new one where it lacks what is wanted."""
+        """The kept renderer, or a new one if that lacks what is wanted."""
         made = self._made_with
         size = wanted.pop("size", (0, 0))
         samples = wanted.get("samples", 1)
@@ -210,7 +210,7 @@ class Volume(Voxels):
         Returns
         -------
         dict of arrays with the rays' leading axes
-            t_hit: in lengths of the direction, inf where nothing is hit. normals: (..., 3), world
+            t_hit: in lengths of the direction, inf if nothing is hit. normals: (..., 3), world
             space, of length 1, away from larger values. position: (..., 3), world space, nan where
             nothing is hit. cell: (..., 3), (z, y, x) of the voxel at the cell's lowest corner.
         """
@@ -248,9 +248,10 @@ class Volume(Voxels):
         isovalue
             The surface is where the field crosses this value along edges between voxels.
         level
-            Of detail; each has half the voxels of the last along each axis.
+            Level of detail; each has half the voxels of the last along each axis.
         normals
-            Of vertices: central differences of voxels. Without, fewer blocks are decoded.
+            Whether vertices have normals, central differences of voxels. Without, fewer blocks are
+            decoded.
         vertices
             "apart": at least 1/1024 of an edge from its voxels, so that no triangle is without
             area, and programs that merge vertices by position find the mesh closed. "exact": where
@@ -258,7 +259,7 @@ class Volume(Voxels):
         device
             "gpu", "cpu", an index, or a part of a name; None: $ISOWAVE_DEVICE, else the first GPU.
         memory_budget
-            Of device memory [bytes]; None: three quarters of it.
+            Most device memory to take [bytes]; None: three quarters of it.
         progress
             Called with what is done and how much of it, 0 to 1.
         """

@@ -195,9 +195,9 @@ def add_isosurface(
     size
         Width and height of the picture [pixels]: at best those of the viewer's canvas.
     name
-        Of the layer. A surface layer of this name is replaced.
+        Name of the layer. A surface layer of this name is replaced.
     request
-        Of Volume.render(): color, normals, device, max_error and so on.
+        Arguments of Volume.render(): color, normals, device, max_error and so on.
 
     Raises
     ------

@@ -196,7 +196,7 @@ def add_isosurface(
     max_error, voxel_pixels, normals
         As for Renderer.render.
     reset_camera
-        Whether the camera is set such that all of the scene is seen; None: if nobody has set it.
+        Whether the camera is set such that all of the scene is seen; None: unless it was set.
 
     Returns
     -------

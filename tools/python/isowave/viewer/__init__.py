@@ -22,7 +22,7 @@ def view(
 ) -> Widget | Server | None:
     """Shows a volume: as a widget in a notebook, elsewhere in a browser tab.
 
-    notebook  whether to make a widget; None: where a Jupyter kernel runs and anywidget is there
+    notebook  whether to make a widget; None: if a Jupyter kernel runs and anywidget is there
     block     in a browser: whether to return only when Ctrl-C ends it, and then None;
               None: unless Python is interactive
     options   isovalue     at first; None: the one that divides the histogram best
@@ -36,7 +36,7 @@ def view(
 
     Ctrl-C returns within a second. A long pass then ends in a thread of its own.
 
-    Raises ImportError with the command that installs what is missing; RuntimeError where it blocks
+    Raises ImportError with the command that installs what is missing; RuntimeError if it blocks
     and the volume cannot be drawn.
     """
     if notebook is None:

@@ -59,7 +59,7 @@ class Extent:
 
 
 def fit_size(size: tuple[int, int], samples: int, max_rays: int) -> tuple[int, int]:
-    """The size [pixels], made smaller in its shape where it has more rays than there may be."""
+    """The size [pixels], made smaller in its shape if it has more rays than there may be."""
     if count_rays(size, samples) <= max_rays:
         return size
     scale = math.sqrt(max_rays / count_rays(size, samples))
@@ -95,7 +95,7 @@ def share_within(
     """The share of the rays with a surface, or perhaps one, that are off by at most `limit`.
 
     depth, bounds  as in Image
-    Returns None where there is no such ray.
+    Returns None if there is no such ray.
     """
     surface = np.isfinite(depth) | (bounds > 0)
     count = int(np.count_nonzero(surface))

@@ -41,7 +41,7 @@ class Renderers:
     first     what the first renderer is made for; none is made for less
     max_rays  of a client's picture, with the ambient ones
     make_host makes the host's renderer, or None
-    changed   the scene's lock; whoever waits for a renderer is notified
+    changed   the scene's lock; notified when a renderer is there, or cannot be made
     wishes    those of the clients now
     tell      hears of a change: an error, or None. The lock is held
     do        works in another thread

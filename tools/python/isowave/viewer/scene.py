@@ -115,7 +115,7 @@ class Scene:
         def deliver(head: dict[str, Any], data: bytes | None = None) -> None:
             try:
                 post(head, data)
-            except Exception:  # whatever transports raise: this client is gone
+            except Exception:  # of the transport: this client is gone
                 self.leave(client)
 
         with self._changed:
@@ -250,7 +250,7 @@ class Scene:
         return max(0.0, min(due) - self._clock()) if due else None
 
     def _serve(self, client: Client, wish: Wish, stage: Stage) -> None:
-        """One stage of a wish. Whatever goes wrong concerns this client alone."""
+        """One stage of a wish. Errors concern this client alone."""
         with self._changed:
             renderer = self._renderers.renderer or self._renderers.host
             extent = self._renderers.fitted(wish, stage)
@@ -315,7 +315,7 @@ class Scene:
                 client.lossless, client.whole_seconds = (head, rgb), now - frame.began
 
     def _on_pass(self, frame: Frame, so_far: ProgressLike) -> bool:
-        """Sends the picture so far where it is worth it. False: the frame is to stop."""
+        """Sends the picture so far if it is worth it. False: the frame is to stop."""
         frame.passes, frame.percent = so_far.passes, so_far.completed_percent
         now = self._clock()
         with self._changed:

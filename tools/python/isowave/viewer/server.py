@@ -445,7 +445,7 @@ def serve(
     open_browser: bool = True,
     **options: Any,
 ) -> Server:
-    """Serves a view of a volume and opens it in a browser, where there is a display.
+    """Serves a view of a volume and opens it in a browser, if there is a display.
 
     options  as for Scene: isovalue, title, device, memory_budget, size, samples, max_clients,
              max_rays

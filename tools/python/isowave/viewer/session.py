@@ -1,4 +1,4 @@
-"""A front end's connection, whatever carries it."""
+"""A front end's connection, by websocket or by a notebook's kernel."""
 
 from __future__ import annotations
 
