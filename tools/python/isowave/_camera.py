@@ -20,8 +20,8 @@ class Camera:
     at: tuple[float, float, float]
     up: tuple[float, float, float] = (0.0, 1.0, 0.0)
     fovy: float = 60.0  #: pinhole: angle between the picture's lower and upper edge [degrees]
-    #: Parallel (orthographic) projection: height of the picture [world units]. Depth is the distance
-    #: from the eye's plane.
+    #: Parallel (orthographic) projection: height of the picture [world units]. Depth is the
+    #: distance from the eye's plane.
     parallel_height: float | None = None
 
     def pixel_size(self, height: int, distance: float) -> float:
