@@ -25,7 +25,9 @@ void judge_bound(const HitOracle &truth, const FrameParams &frame, std::uint32_t
     return;
   }
   if (!says_hit) return;
-  const double t = double{drawn.t}, pixel_size = 2 * double{frame.view.pixel_scale} * t;
+  const double t = double{drawn.t};
+  const double pixel_size = 2 * double{frame.view.pixel_scale} *
+                            (frame.view.is_parallel != 0 ? double{frame.view.t_scale} : t);
   const double error = std::abs(t - hit.t * double{frame.view.t_scale}) / pixel_size;
   tally.exceeded += error > bound;
   tally.slack.push_back(bound / error);

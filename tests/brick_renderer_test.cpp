@@ -141,6 +141,21 @@ TEST_P(BrickTeamOnDevice, AWordForEachColourOfManyBricks) {
   }
 }
 
+/// Bricks are put together from where parallel rays come from, wherever their eye is.
+TEST_P(BrickTeamOnDevice, ParallelRays) {
+  for (Camera camera : orbit_cameras(volume_.info(), 3)) {
+    camera.eye = 0.5 * (camera.eye + camera.at);
+    request_.camera = in_parallel(camera);
+    const RendererOptions options{.size = kFrame};
+    const Image8 whole = picture_of_one(request_, options);
+    on_ranks(4, options, [&](TeamRenderer &renderer, std::uint32_t rank) {
+      renderer.render(request_);
+      const Image8 image = renderer.shade({});
+      EXPECT_TRUE(rank != 0 || image.pixels == whole.pixels);
+    });
+  }
+}
+
 std::size_t num_drawn(const Image8 &image) {
   std::size_t drawn = 0;
   for (std::size_t i = 0; i < image.pixels.size(); i += 3)

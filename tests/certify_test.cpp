@@ -599,6 +599,17 @@ TEST_P(CertifyOnDevice, RefusesWhatIsNotKnown) {
     EXPECT_THROW(choose_detail(renderer, scene.volume, {camera, 0.3f}, bad), Error);
 }
 
+/// A pixel covers the same at all distances.
+TEST_P(CertifyOnDevice, FramesOfParallelProjection) {
+  const Scene scene({40, 36, 44}, test::gyroid_field(13), {.rate = 8});
+  DeviceRenderer renderer(device_, scene.volume, {.size = kMedium, .with_bounds = true});
+  for (const Camera &camera : orbit_cameras(scene.volume.info, 2)) {
+    const FrameRequest request{.camera = in_parallel(camera), .isovalue = 0.3f};
+    certify_frame(renderer, scene, request, 1);
+  }
+  EXPECT_GT(certified_, all_ / 2);
+}
+
 TEST_P(CertifyOnDevice, HitsOfAnotherPictureAreRefused) {
   const Scene scene({20, 20, 20}, test::gyroid_field(10), {.rate = 8});
   const FrameRequest request{orbit_cameras(scene.volume.info, 1)[0], 0.3f, kSmall};

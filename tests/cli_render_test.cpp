@@ -202,6 +202,30 @@ TEST(CliRender, NormalsOfBothKinds) {
   EXPECT_EQ(run_isowave("render " + kHead + " -i 80 --normals flat").status, 1);
 }
 
+/// By --parallel, and by a camera file; the reference draws the same.
+TEST(CliRender, ParallelProjection) {
+  const TemporaryFolder folder;
+  const std::string what = kHead + " -i 80 --size 40x30 ";
+  const auto file = [&](const char *name) { return quoted(folder / name); };
+  render(what + "--parallel -o " + file("a.png") + " --stats " + file("a.json"));
+  render(what + "--parallel --reference -o " + file("b.png"));
+  render(what + "-o " + file("c.png"));
+  EXPECT_EQ(test::read_file(folder / "a.png"), test::read_file(folder / "b.png"));
+  EXPECT_NE(test::read_file(folder / "a.png"), test::read_file(folder / "c.png"));
+  const auto camera =
+      nlohmann::json::parse(test::read_file(folder / "a.json"))["frames"][0]["camera"];
+  EXPECT_GT(camera["parallel_height"], 0);
+  nlohmann::json views = {{"fovy_deg", camera["fovy_deg"]}, {"cameras", {camera}}};
+  test::write_file(folder / "v.json", views.dump());
+  render(what + "--cameras " + file("v.json") + " -o " + file("d.png"));
+  EXPECT_EQ(test::read_file(folder / "a.png"), test::read_file(folder / "d.png"));
+  views["cameras"][0]["parallel_height"] = -1;
+  test::write_file(folder / "v.json", views.dump());
+  test::expect_one_line_error(
+      "render " + what + "--cameras " + file("v.json") + " -o " + file("e.png"),
+      "parallel projection");
+}
+
 TEST(CliRender, ReferenceIsTheSamePicture) {
   const TemporaryFolder folder;
   const auto outputs = [&](const std::string &name) {

@@ -349,7 +349,7 @@ TEST_P(LevelsOnDevice, FewerPlanesOfEveryLevel) {
   }
 }
 
-/// Of a level alone: the planes of twice the error for each level.
+/// A level alone has the planes of twice the error for each level.
 TEST_P(LevelsOnDevice, FewerPlanesWithDistance) {
   const CompressedVolume volume = pyramid_of({30, 27, 33}, test::gyroid_field(10));
   const Camera camera = orbit_cameras(volume.info, 1)[0];
@@ -439,7 +439,7 @@ TEST_P(LevelsOnDevice, RefusesWhatItCannotDraw) {
   EXPECT_THAT(
       [&] {
         DeviceRenderer(device_, volume,
-                 {.size = kSmall, .pipeline = blocks_pipeline(), .with_levels = true});
+                       {.size = kSmall, .pipeline = blocks_pipeline(), .with_levels = true});
       },
       ThrowsMessage<Error>(HasSubstr("pipeline blocks")));
   DeviceRenderer renderer(device_, volume, {.size = kSmall, .with_levels = true});

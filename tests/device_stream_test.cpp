@@ -41,7 +41,7 @@ CompressedVolume indexed_volume(std::int32_t min_exponent, const glm::uvec3 &dim
   return compress_with_libzfp(random_voxels(dims, -3, 3, 7), dims, 0, min_exponent);
 }
 
-/// Of every kind.
+/// Volumes of every kind.
 std::vector<std::pair<std::string, CompressedVolume>> odd_volumes() {
   std::vector<std::pair<std::string, CompressedVolume>> volumes;
   for (const std::uint32_t bits : kOddBits)

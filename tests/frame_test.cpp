@@ -28,7 +28,7 @@ struct PixelRange {
   bool empty() const { return end_x == 0; }
 };
 
-/// Of the pixels whose rays meet the active box.
+/// The range of the pixels whose rays meet the active box.
 PixelRange seen_range(const FrameParams &frame) {
   const LastPlanes last = last_planes(&frame);
   const LastPlanes begin = {4 * frame.surface.active_begin_x, 4 * frame.surface.active_begin_y,

@@ -182,7 +182,7 @@ TEST_P(HostStreamOnDevice, ProfilingChangesNothing) {
   EXPECT_TRUE(uploads);
 }
 
-/// From the file, which is read when a renderer is made; cut later, it is missed by nobody until
+/// From the file, which is read when a renderer is made: a file that is cut later is found out
 /// then.
 TEST_P(HostStreamOnDevice, FilesAlsoCutOnes) {
   const test::TemporaryFolder folder;

@@ -32,7 +32,7 @@ constexpr float kIsovalue = 0.8f;  // both fields: many candidate blocks that ra
 class InvarianceOnDevice : public testing::TestWithParam<PipelineOnDevice> {
  protected:
   bool is_slow() const { return is_llvmpipe(device_.info()); }
-  /// Of cases that are called Small.
+  /// The picture's size in cases that are called Small.
   ImageSize small_size() const { return is_simulator(device_.info()) ? kTiny : kSmall; }
 
   static bool is_blocks() { return GetParam().is_blocks(); }
@@ -153,7 +153,7 @@ TEST_P(InvarianceOnDevice, SpeculationNeverNeedsMorePasses) {
     const FrameStats stats = check(
         volume, {.size = kMedium, .max_speculation = limit, .on_demand = DecodeOnDemand::kOff});
     EXPECT_EQ(total(stats, &PassCounts::decoded_count), total(stats, &PassCounts::requested_count));
-    for (const PassStats &pass : stats.passes) {  // an ample cache: nobody waits for slots
+    for (const PassStats &pass : stats.passes) {  // an ample cache: no ray waits for slots
       if (is_blocks()) {
         EXPECT_EQ(pass.counts.granted_count, pass.counts.pair_count);
       }

@@ -335,8 +335,8 @@ TEST_P(MacrocellsOnDevice, NoisyPlateaus) {
   EXPECT_GT(between, 100);
 }
 
-/// Masks of a volume and of its bounds are kept side by side: whoever draws them by turns finds
-/// them as they were.
+/// Masks of a volume and of its bounds are kept side by side: a renderer that draws them by turns
+/// finds them as they were.
 TEST_P(MacrocellsOnDevice, SmallSelectionsAreKept) {
   const glm::uvec3 dims(24, 20, 18);
   const CompressedVolume volume = compress_with_libzfp(sphere_voxels(dims), dims, 2048);

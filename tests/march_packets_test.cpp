@@ -25,7 +25,7 @@ class MarchPacketsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
  protected:
   ocl::Device device_{GetParam()};
 
-  /// Elsewhere nobody marches in packets, and Mesa takes a quarter of an hour to compile them.
+  /// Other devices do not march in packets, and Mesa takes a quarter of an hour to compile them.
   void SetUp() override {
     if (!MarchPackets::suits(device_.info()) && device_.info().platform != "Oclgrind")
       GTEST_SKIP() << "rays go alone there";

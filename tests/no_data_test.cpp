@@ -69,7 +69,7 @@ struct NamedHole {
   Hole hole;
 };
 
-/// Of a volume of dims.
+/// Holes of a volume of dims.
 std::vector<NamedHole> holes(const glm::uvec3 &dims) {
   const auto scattered = [dims](const glm::uvec3 &at) {
     const std::uint32_t number = at.x + dims.x * (at.y + dims.y * at.z);

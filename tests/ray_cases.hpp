@@ -46,6 +46,12 @@ inline std::vector<CameraCase> camera_cases(const glm::uvec3 &dims) {
       {"a million voxels away", {{6.1e5, 5.3e5, 7.2e5}, centre, y, 0.002}},
       {"looking away", {{-5, -5, -5}, {-50, -60, -40}, y, 60}},
       {"beside the volume", {{-30, centre.y, -3}, {30, centre.y, -3}, y, 3}},
+      {"parallel", {{-0.7 * last.x, 1.3 * last.y, 1.9 * last.z}, centre, y, 60, last.y + 9}},
+      {"parallel, from within", {centre, {last.x + 7, 3.3, -4.1}, y, 60, last.y}},
+      {"parallel, along +z on a block edge", {{4, 4, -15}, {4, 4, 0}, y, 60, 17}},
+      {"parallel, along -x, between voxels",
+       {{last.x + 20, middle_voxel.y + 0.5, middle_voxel.z + 0.5}, middle_voxel + 0.5, z, 60, 34}},
+      {"parallel, 3000 voxels away", {{1700, 1600, 1900}, centre, y, 60, 2 * last.x}},
   };
 }
 

@@ -28,10 +28,12 @@ inline OracleRay oracle_ray(const Camera &camera, ImageSize size, std::uint32_t 
   const glm::dvec3 fwd = glm::normalize(camera.at - camera.eye);
   const glm::dvec3 right = glm::normalize(glm::cross(fwd, camera.up));
   const glm::dvec3 up = glm::cross(right, fwd);
-  const double a = std::tan(glm::radians(camera.fovy_deg) / 2), width = size.width,
-               height = size.height;
+  const double width = size.width, height = size.height;
+  const double a = camera.parallel_height ? *camera.parallel_height / 2
+                                          : std::tan(glm::radians(camera.fovy_deg) / 2);
   const double u = (2 * (column + 0.5) / width - 1) * a * width / height;
   const double v = (1 - 2 * (row + 0.5) / height) * a;
+  if (camera.parallel_height) return {camera.eye + u * right + v * up, fwd};
   return {camera.eye, glm::normalize(fwd + u * right + v * up)};
 }
 

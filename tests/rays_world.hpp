@@ -53,7 +53,7 @@ struct RaysWorld {
             block / frame.grid.blocks_x / frame.grid.blocks_y};
   }
 
-  /// Of masks laid out as those of the macrocells.
+  /// A block's bit in masks laid out as those of the macrocells.
   bool has_bit(const std::vector<uint> &masks, uint block) const {
     const glm::uvec3 b = coords(block);
     const uint coarse_x = (frame.grid.blocks_x + 3) / 4, coarse_y = (frame.grid.blocks_y + 3) / 4;

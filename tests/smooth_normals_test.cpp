@@ -461,7 +461,7 @@ TEST_P(NormalsOnDevice, CancelledNormalsLeaveNoTrace) {
   EXPECT_GT(num_cut, 0u) << "else nothing was cut short";
 }
 
-/// As whoever interrupts a notebook does.
+/// As an interrupt of a notebook does.
 TEST_P(NormalsOnDevice, AFrameWhoseWatcherThrowsLeavesNoTrace) {
   const TestVolume volume = volume_of_test();
   const Camera camera = orbit_cameras(volume.info(), 1)[0];

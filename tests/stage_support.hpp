@@ -36,7 +36,7 @@ inline std::vector<uint> awkward_counts(uint n) {
   return {0, 1, 2, n / 2, n - 1, n, n + 1, 4 * n / 3, 3 * n};
 }
 
-/// Where two long vectors first differ; printing them whole helps nobody.
+/// The first place where two long vectors differ; they are too long to print.
 inline constexpr std::ptrdiff_t kNoDifference = -1;
 template <class T>
 std::ptrdiff_t first_difference(const std::vector<T> &got, const std::vector<T> &expected) {

@@ -102,7 +102,7 @@ struct StageWorld {
   }
 
   /// Instead of decoding: puts the voxels [nz][ny][nx] of the blocks just granted into their slots,
-  /// and NaN into padding, which nobody may use.
+  /// and NaN into padding, which no kernel may use.
   void fill_slots(const std::vector<float> &voxels) {
     const uint granted = counts().decoded_count;
     const std::vector<uint> blocks = cache.request_block_ids.read(),

@@ -46,7 +46,7 @@ Selection random_selection(const FrameParams &frame, uint one_in, uint seed) {
   return selected;
 }
 
-/// Of an isovalue.
+/// The blocks and macrocells that are active at the frame's isovalue.
 Selection selection_of(const Macrocells &macrocells, const FrameParams &frame) {
   const std::vector<uint> masks = macrocells.masks().read();
   const BlockGrid &grid = frame.grid;

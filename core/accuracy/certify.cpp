@@ -309,7 +309,6 @@ Certificate certify(Renderer &renderer, const CompressedVolume &volume, const Fr
   team.reduce(uncertain.size(), Reduction::kOr, Receiver::kRank0, make, take);
   if (!is_first) return certificate;
 
-  const double pixel_at_1 = 2.0 * std::tan(glm::radians(request.camera.fovy_deg) / 2) / size.height;
   certificate.bounds.assign(drawn.size(), kNotCertain);
   parallel_for(size.ray_rows(), 0, [&](std::uint64_t row, std::uint32_t) {
     const auto first = static_cast<std::uint32_t>(row * size.ray_columns());
@@ -325,7 +324,8 @@ Certificate certify(Renderer &renderer, const CompressedVolume &volume, const Fr
         if (first_t < way[0] || last_t > way[1]) continue;
         const double rounding = kDistanceRounding * last_t + cell_rounding;
         const double distance = std::max(t - first_t, last_t - t) + rounding;
-        bound = std::nextafter(static_cast<float>(distance / (t * pixel_at_1)), kNotCertain);
+        const double pixel_size = pixel_size_at(request.camera, size.height, t);
+        bound = std::nextafter(static_cast<float>(distance / pixel_size), kNotCertain);
       }
     }
   });

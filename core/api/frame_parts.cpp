@@ -122,7 +122,8 @@ core::ImageSize core_size(const ImageSize &size) {
 }
 
 Camera public_camera(const core::Camera &camera) {
-  return {from_glm(camera.eye), from_glm(camera.at), from_glm(camera.up), camera.fovy_deg};
+  return {from_glm(camera.eye), from_glm(camera.at), from_glm(camera.up), camera.fovy_deg,
+          camera.parallel_height};
 }
 
 core::Appearance core_appearance(const Appearance &appearance) {
@@ -133,7 +134,8 @@ core::Appearance core_appearance(const Appearance &appearance) {
 core::FrameRequest core_request(const FrameRequest &request, const core::CompressedVolume &volume) {
   core::FrameRequest result;
   const Camera &camera = request.camera;
-  result.camera = {to_glm(camera.eye), to_glm(camera.at), to_glm(camera.up), camera.fovy_degrees};
+  result.camera = {to_glm(camera.eye), to_glm(camera.at), to_glm(camera.up), camera.fovy_degrees,
+                   camera.parallel_height};
   result.isovalue = core::drawn_isovalue(volume, request.isovalue);
   result.size = core_size(request.size);
   result.voxel_pixels = request.voxel_pixels;

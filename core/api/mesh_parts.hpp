@@ -1,5 +1,5 @@
 #pragma once
-// Private to core/api: meshes of its users and of core, whoever extracts them.
+// Private to core/api: meshes of its users and of core, from the host and from devices.
 
 #include <string>
 #include <string_view>

@@ -24,6 +24,12 @@ RendererOptions options_for(const TeamVolume &volume, RendererOptions options) {
   return options;
 }
 
+/// Where rays come from: parallel ones from far away.
+glm::vec3 eye_of(const View &view) {
+  if (view.is_parallel == 0) return {view.eye_x, view.eye_y, view.eye_z};
+  return -0x1p100f * glm::sign(glm::vec3(view.fwd_x, view.fwd_y, view.fwd_z));
+}
+
 }  // namespace
 
 TeamRenderer::TeamRenderer(ocl::Device &device, const TeamVolume &volume, RendererOptions options,
@@ -60,7 +66,7 @@ FrameStats TeamRenderer::render(const FrameRequest &request) {
   check(request, abilities());
   check_levels(request);
   const View view = make_view(whole_levels_.front(), request.camera, size_of(request, abilities()));
-  place_ = cuts_.order_from({view.eye_x, view.eye_y, view.eye_z})[team_.rank()];
+  place_ = cuts_.order_from(eye_of(view))[team_.rank()];
   own_hits_.clear();
   num_hits_.reset();
   has_whole_ = false;

@@ -262,6 +262,8 @@ MeshFrameStats MeshRenderer::render(const Camera &camera, float isovalue,
   const auto begin = std::chrono::steady_clock::now();
   const ImageSize picture = size.value_or(options_.size);
   check_image_size(picture);
+  if (camera.parallel_height)
+    throw Error("triangles are drawn in perspective alone: leave out parallel projection");
   if (picture.num_rays() > options_.size.num_rays()) {
     throw Error("{}x{} pixels have more than the {} rays that the renderer was made for",
                 picture.width, picture.height, options_.size.num_rays());

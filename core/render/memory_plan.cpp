@@ -128,11 +128,13 @@ StreamPlace stream_place_from_string(std::string_view name) {
   throw Error("the compressed volume cannot be on '{}': auto, device, host", name);
 }
 
-std::uint32_t first_cache_slots(std::uint64_t num_blocks, std::uint64_t num_rays) {
+std::uint32_t first_cache_slots(std::uint64_t num_blocks, std::uint64_t num_rays,
+                                bool with_given_rays) {
   const double edge = std::cbrt(double(num_blocks));
   const std::uint64_t wanted =
       std::min(static_cast<std::uint64_t>(std::llround(kSlotsPerFace * edge * edge)),
-               num_rays * kSlotsOfThose / kRaysPerSlot);
+               num_rays * kSlotsOfThose / kRaysPerSlot) *
+      (with_given_rays ? 2 : 1);
   const std::uint64_t slots = std::min(std::max(wanted, kFewSlots), num_blocks);
   return static_cast<std::uint32_t>(
       std::clamp<std::uint64_t>(slots, kMinCacheSlots, ISO_MAX_CACHE_SLOTS));
@@ -267,7 +269,8 @@ MemoryPlan plan_to_grow(const ocl::Device &device, const CompressedVolume &volum
   for (const CompressedVolume *level : levels_of(volume, request.with_levels))
     num_blocks += level->block_count();
   const std::uint64_t first =
-      first_slots != 0 ? first_slots : first_cache_slots(num_blocks, request.num_rays);
+      first_slots != 0 ? first_slots
+                       : first_cache_slots(num_blocks, request.num_rays, request.with_given_rays);
   MemoryPlan plan = plan_of(first);
   const std::uint64_t decoded = ISO_BLOCK_VOXELS * sizeof(float) * volume.block_count();
   if (first_slots == 0 && plan.total() > decoded) {  // bytes grow linearly with the slots

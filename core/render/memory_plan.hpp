@@ -78,8 +78,11 @@ struct MemoryPlan {
 MemoryPlan resized(MemoryPlan plan, std::uint32_t cache_slots);
 
 /// Slots with which a cache begins that may grow: for the blocks that a frame needs in most volumes
-/// and as many again, so that the next frame finds free ones.
-std::uint32_t first_cache_slots(std::uint64_t num_blocks, std::uint64_t num_rays);
+/// and as many again, so that the next frame finds free ones. Twice that with rays of any origin:
+/// ambient rays come to blocks that the camera's do not, and a cache that has to grow for them
+/// makes the second frame a cold one.
+std::uint32_t first_cache_slots(std::uint64_t num_blocks, std::uint64_t num_rays,
+                                bool with_given_rays = false);
 
 /// Slots for the next frame, after one that has freed `recycled` slots of blocks that it had asked
 /// for itself; plan.cache_slots where these do.

@@ -100,6 +100,9 @@ void check_camera(const Camera &camera, std::string_view what) {
   if (!(camera.fovy_deg > 0.0 && camera.fovy_deg < 180.0)) {
     throw Error("{}: fovy_deg is {}, must be between 0 and 180", what, camera.fovy_deg);
   }
+  if (const double height = camera.parallel_height.value_or(1);
+      !(height > 1 / kLongest && height < kLongest))
+    throw Error("{}: the height of parallel projection is {}, must be above 0", what, height);
   const glm::dvec3 view = camera.at - camera.eye;
   const double view_length = glm::length(view), up_length = glm::length(camera.up);
   if (view_length > kLongest || up_length > kLongest)
@@ -109,6 +112,18 @@ void check_camera(const Camera &camera, std::string_view what) {
   if (glm::length(glm::cross(view / view_length, camera.up / up_length)) < kMinSinViewUp) {
     throw Error("{}: up is parallel to the view; choose another up", what);
   }
+}
+
+Camera in_parallel(const Camera &camera) {
+  Camera result = camera;
+  const double distance = glm::length(camera.at - camera.eye);
+  result.parallel_height = 2 * distance * std::tan(glm::radians(camera.fovy_deg) / 2);
+  return result;
+}
+
+double pixel_size_at(const Camera &camera, std::uint32_t height, double distance) {
+  if (camera.parallel_height) return *camera.parallel_height / height;
+  return distance * (2.0 * std::tan(glm::radians(camera.fovy_deg) / 2) / height);
 }
 
 CameraFile read_camera_file(const std::filesystem::path &path) {
@@ -133,9 +148,11 @@ CameraFile read_camera_file(const std::filesystem::path &path) {
   }
   for (const json &entry : cameras) {
     const std::string what = fmt::format("{}: camera {}", where, file.cameras.size());
-    const Camera camera{vector3(member(entry, "eye", what), "eye", what),
-                        vector3(member(entry, "at", what), "at", what),
-                        vector3(member(entry, "up", what), "up", what), fovy_deg};
+    Camera camera{vector3(member(entry, "eye", what), "eye", what),
+                  vector3(member(entry, "at", what), "at", what),
+                  vector3(member(entry, "up", what), "up", what), fovy_deg};
+    if (entry.contains("parallel_height"))
+      camera.parallel_height = number(entry["parallel_height"], "parallel_height", what);
     check_camera(camera, what);
     file.cameras.push_back(camera);
   }

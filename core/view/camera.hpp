@@ -11,16 +11,20 @@
 
 namespace isowave::core {
 
-/// A pinhole camera in world space. fovy is the full vertical angle.
+/// A camera in world space: a pinhole, or parallel projection.
 struct Camera {
   glm::dvec3 eye{0.0}, at{0.0, 0.0, -1.0}, up{0.0, 1.0, 0.0};
-  double fovy_deg = 60.0;
+  double fovy_deg = 60.0;  ///< pinhole: the full vertical angle
+  /// Parallel projection: height of the picture [world units]; depth is the distance from the eye's
+  /// plane, and what is behind that is not seen.
+  std::optional<double> parallel_height{};
 
   friend bool operator==(const Camera &, const Camera &) = default;
 };
 
 /// A camera file (JSON): `{"dims":[..],"spacing":[..],"width":W,"height":H,"fovy_deg":F,
-/// "cameras":[{"eye":[..],"at":[..],"up":[..]}]}`. dims, spacing, width and height are optional.
+/// "cameras":[{"eye":[..],"at":[..],"up":[..]}]}`. dims, spacing, width and height are optional;
+/// a camera with "parallel_height":H is in parallel projection.
 struct CameraFile {
   std::optional<glm::uvec3> dims;
   std::optional<glm::dvec3> spacing;
@@ -33,6 +37,13 @@ struct CameraFile {
 CameraFile read_camera_file(const std::filesystem::path &path);
 /// Throws  Error: the camera is degenerate (see read_camera_file); `what` names it
 void check_camera(const Camera &camera, std::string_view what);
+
+/// The same view in parallel projection, in which what is as far away as `at` has the same size.
+Camera in_parallel(const Camera &camera);
+/// The height of a pixel at a distance from the eye [world units].
+///
+/// height  of the picture [pixels]
+double pixel_size_at(const Camera &camera, std::uint32_t height, double distance);
 
 /// A view of a box from the front right and above, where orbit_cameras() begins, in which it fills
 /// the picture to `margin` of it.

@@ -129,12 +129,13 @@ std::vector<FrameParams> make_level_frames(std::span<const VolumeInfo> levels, c
   const glm::dmat3 to_world = finest.index_to_world();
   const double voxel =
       std::max({glm::length(to_world[0]), glm::length(to_world[1]), glm::length(to_world[2])});
-  const double pixel =
-      2.0 * std::tan(glm::radians(camera.fovy_deg) / 2) / size.height;  // at distance 1
+  const double pixel = pixel_size_at(camera, size.height, 1);
   const auto [nearest, farthest] = reach(levels.back(), camera.eye);
   // Levels' t differ by powers of two, so that their borders are the same in all bits.
+  // Parallel rays see one level at all distances.
   const auto border = [&](std::size_t level, const FrameParams &frame) {
-    const double t = std::ldexp(voxel, static_cast<int>(level)) / (voxel_pixels * pixel);
+    double t = std::ldexp(voxel, static_cast<int>(level)) / (voxel_pixels * pixel);
+    if (camera.parallel_height) t = t <= 1 ? 0 : std::numeric_limits<double>::infinity();
     return static_cast<float>(t / frames[0].view.t_scale) *
            (frames[0].view.t_scale / frame.view.t_scale);
   };

@@ -107,6 +107,24 @@ void check_distances(const VolumeInfo &info, std::string_view what) {
   check_places(info, info.origin, what);
 }
 
+namespace {
+
+/// Parallel rays start in a plane around the eye, where float32 must hold their places.
+void check_parallel(double height, ImageSize size, double t_scale, const glm::dvec3 &right,
+                    const glm::dvec3 &up) {
+  const double v = height / 2 / t_scale, u = v * size.width / size.height;
+  const double farthest = u * largest_component(right) + v * largest_component(up);
+  const double step = height / size.ray_rows() / t_scale;
+  if (farthest > 1e7 || step < 0x1p-100) {
+    throw Error(
+        "a picture of parallel projection that is {:.3g} high cannot be drawn in float32: up to "
+        "1e7 voxels from the eye can",
+        height);
+  }
+}
+
+}  // namespace
+
 View make_view(const VolumeInfo &info, const Camera &camera, ImageSize size) {
   check_volume_info(info, "the volume");
   check_camera(camera, "the camera");
@@ -137,24 +155,29 @@ View make_view(const VolumeInfo &info, const Camera &camera, ImageSize size) {
   fwd *= t_scale;
   right *= t_scale;
   up *= t_scale;
+  if (camera.parallel_height) check_parallel(*camera.parallel_height, size, t_scale, right, up);
 
-  return {.width = size.ray_columns(),
-          .height = size.ray_rows(),
-          .eye_x = flush_tiny(eye.x),
-          .eye_y = flush_tiny(eye.y),
-          .eye_z = flush_tiny(eye.z),
-          .fwd_x = flush_tiny(fwd.x),
-          .fwd_y = flush_tiny(fwd.y),
-          .fwd_z = flush_tiny(fwd.z),
-          .right_x = flush_tiny(right.x),
-          .right_y = flush_tiny(right.y),
-          .right_z = flush_tiny(right.z),
-          .up_x = flush_tiny(up.x),
-          .up_y = flush_tiny(up.y),
-          .up_z = flush_tiny(up.z),
-          .pixel_scale =
-              static_cast<float>(std::tan(glm::radians(camera.fovy_deg) / 2) / size.ray_rows()),
-          .t_scale = static_cast<float>(t_scale)};
+  return {
+      .width = size.ray_columns(),
+      .height = size.ray_rows(),
+      .eye_x = flush_tiny(eye.x),
+      .eye_y = flush_tiny(eye.y),
+      .eye_z = flush_tiny(eye.z),
+      .fwd_x = flush_tiny(fwd.x),
+      .fwd_y = flush_tiny(fwd.y),
+      .fwd_z = flush_tiny(fwd.z),
+      .right_x = flush_tiny(right.x),
+      .right_y = flush_tiny(right.y),
+      .right_z = flush_tiny(right.z),
+      .up_x = flush_tiny(up.x),
+      .up_y = flush_tiny(up.y),
+      .up_z = flush_tiny(up.z),
+      .pixel_scale =
+          camera.parallel_height
+              ? static_cast<float>(*camera.parallel_height / 2 / size.ray_rows() / t_scale)
+              : static_cast<float>(std::tan(glm::radians(camera.fovy_deg) / 2) / size.ray_rows()),
+      .t_scale = static_cast<float>(t_scale),
+      .is_parallel = camera.parallel_height ? 1u : 0u};
 }
 
 FrameParams make_frame_params(const VolumeInfo &info, const Camera &camera, ImageSize size,
@@ -191,10 +214,19 @@ ScreenBox make_screen_box(const FrameParams &frame) {
   // that basis: by how much?
   const glm::dmat3 sizes(glm::abs(basis[0]), glm::abs(basis[1]), glm::abs(basis[2]));
   const glm::dmat3 to_sizes(glm::abs(to_view[0]), glm::abs(to_view[1]), glm::abs(to_view[2]));
-  const double length = glm::length(glm::dvec3(1, border.x, border.y));
-  const glm::dvec3 off = to_sizes * (0x1p-21 * (sizes * glm::dvec3(1, border.x, border.y)) +
-                                     double{ISO_SMALLEST_DIRECTION} * length);
-  const glm::dvec2 margin = 1.0 + (glm::dvec2(off.y, off.z) + border * off.x) / pixel;
+  const bool is_parallel = view.is_parallel != 0;
+  const double length = is_parallel ? 1.0 : glm::length(glm::dvec3(1, border.x, border.y));
+  const glm::dvec3 largest(1, is_parallel ? 0.0 : border.x, is_parallel ? 0.0 : border.y);
+  const glm::dvec3 off =
+      to_sizes * (0x1p-21 * (sizes * largest) + double{ISO_SMALLEST_DIRECTION} * length);
+  // Parallel rays start at eye + u right + v up, rounded, too.
+  const glm::dvec3 off_start =
+      to_sizes * (0x1p-21 * (glm::abs(eye) + sizes * glm::dvec3(0, border.x, border.y)));
+  const auto margin_at = [&](double t) {
+    if (!is_parallel) return 1.0 + (glm::dvec2(off.y, off.z) + border * off.x) / pixel;
+    return 1.0 +
+           (glm::dvec2(off.y, off.z) * std::abs(t) + glm::dvec2(off_start.y, off_start.z)) / pixel;
+  };
 
   glm::dvec2 begin(std::numeric_limits<double>::infinity()), end = -begin;
   for (int corner = 0; corner < 8; ++corner) {
@@ -207,15 +239,16 @@ ScreenBox make_screen_box(const FrameParams &frame) {
     const glm::dvec3 at =
         within + glm::dvec3(frame.brick.origin_x, frame.brick.origin_y, frame.brick.origin_z);
     const glm::dvec3 in_view = to_view * (at - eye);
-    if (!(in_view.x > 1e-3 && margin.x < size.x &&
+    const glm::dvec2 margin = margin_at(in_view.x);
+    if (!((is_parallel || in_view.x > 1e-3) && margin.x < size.x &&
           margin.y < size.y)) {  // beside or behind the eye, or all rounded
       begin = glm::dvec2(0);
       end = size;
       break;
     }
     // See make_ray(): u = (2 column + 1 - width) pixel_scale, v = (height - 1 - 2 row) pixel_scale.
-    const glm::dvec2 projected =
-        0.5 * (size - 1.0) + glm::dvec2(in_view.y, -in_view.z) / (in_view.x * pixel);
+    const glm::dvec2 projected = 0.5 * (size - 1.0) + glm::dvec2(in_view.y, -in_view.z) /
+                                                          ((is_parallel ? 1 : in_view.x) * pixel);
     begin = glm::min(begin, projected - margin);
     end = glm::max(end, projected + margin + 1.0);
   }

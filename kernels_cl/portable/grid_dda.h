@@ -91,25 +91,30 @@ ISO_INLINE RayAxis make_ray_axis(float o, float d) {
   return a;
 }
 
+/// An axis of make_ray().
+ISO_INLINE RayAxis make_camera_axis(uint is_parallel, float u, float v, float length, float eye,
+                                    float fwd, float right, float up) {
+  return is_parallel != 0 ? make_ray_axis(fma(v, up, fma(u, right, eye)), fwd)
+                          : make_ray_axis(eye, fma(v, up, fma(u, right, fwd)) / length);
+}
+
 /// The ray of a pixel (row-major, row 0 at the top). Its direction is (fwd + u right + v up) /
 /// sqrt(1 + u^2 + v^2), mapped to index space; t * frame->view.t_scale is the distance from the eye
-/// in world units.
+/// in world units. A parallel ray's direction is fwd; its distance is that from the eye's plane.
 ISO_INLINE Ray make_ray(const FrameParams *frame, uint pixel) {
   const int column = (int)(pixel % frame->view.width);
   const int row = (int)(pixel / frame->view.width);
+  const uint is_parallel = frame->view.is_parallel;
   const float u = (float)(2 * column + 1 - (int)frame->view.width) * frame->view.pixel_scale;
   const float v = (float)((int)frame->view.height - 1 - 2 * row) * frame->view.pixel_scale;
   const float length = sqrt(fma(u, u, fma(v, v, 1.0f)));
   Ray r;
-  r.x = make_ray_axis(
-      frame->view.eye_x,
-      fma(v, frame->view.up_x, fma(u, frame->view.right_x, frame->view.fwd_x)) / length);
-  r.y = make_ray_axis(
-      frame->view.eye_y,
-      fma(v, frame->view.up_y, fma(u, frame->view.right_y, frame->view.fwd_y)) / length);
-  r.z = make_ray_axis(
-      frame->view.eye_z,
-      fma(v, frame->view.up_z, fma(u, frame->view.right_z, frame->view.fwd_z)) / length);
+  r.x = make_camera_axis(is_parallel, u, v, length, frame->view.eye_x, frame->view.fwd_x,
+                         frame->view.right_x, frame->view.up_x);
+  r.y = make_camera_axis(is_parallel, u, v, length, frame->view.eye_y, frame->view.fwd_y,
+                         frame->view.right_y, frame->view.up_y);
+  r.z = make_camera_axis(is_parallel, u, v, length, frame->view.eye_z, frame->view.fwd_z,
+                         frame->view.right_z, frame->view.up_z);
   r.x.origin = frame->brick.origin_x;
   r.y.origin = frame->brick.origin_y;
   r.z.origin = frame->brick.origin_z;

@@ -137,6 +137,19 @@ ISO_INLINE void make_packet_axis(Floats o, Floats d, float origin, PacketAxis *a
   a->sign = pick(a->up, floats(1.0f), floats(-1.0f));
 }
 
+/// make_camera_axis() of each lane.
+ISO_INLINE void make_packet_camera_axis(const View *view, Floats u, Floats v, Floats length,
+                                        float eye, float fwd, float right, float up, float origin,
+                                        PacketAxis *a) {
+  if (view->is_parallel != 0) {
+    make_packet_axis(fma(v, floats(up), fma(u, floats(right), floats(eye))), floats(fwd), origin,
+                     a);
+  } else {
+    make_packet_axis(floats(eye), fma(v, floats(up), fma(u, floats(right), floats(fwd))) / length,
+                     origin, a);
+  }
+}
+
 /// make_ray() of pixels (column, row), into axes [3].
 ISO_INLINE void make_packet_axes(const FrameParams *frame, Ints column, Ints row,
                                  PacketAxis *axes) {
@@ -144,18 +157,12 @@ ISO_INLINE void make_packet_axes(const FrameParams *frame, Ints column, Ints row
   const Floats u = to_floats(2 * column + 1 - (int)view->width) * view->pixel_scale;
   const Floats v = to_floats((int)view->height - 1 - 2 * row) * view->pixel_scale;
   const Floats length = sqrt(fma(u, u, fma(v, v, floats(1.0f))));
-  make_packet_axis(
-      floats(view->eye_x),
-      fma(v, floats(view->up_x), fma(u, floats(view->right_x), floats(view->fwd_x))) / length,
-      frame->brick.origin_x, &axes[0]);
-  make_packet_axis(
-      floats(view->eye_y),
-      fma(v, floats(view->up_y), fma(u, floats(view->right_y), floats(view->fwd_y))) / length,
-      frame->brick.origin_y, &axes[1]);
-  make_packet_axis(
-      floats(view->eye_z),
-      fma(v, floats(view->up_z), fma(u, floats(view->right_z), floats(view->fwd_z))) / length,
-      frame->brick.origin_z, &axes[2]);
+  make_packet_camera_axis(view, u, v, length, view->eye_x, view->fwd_x, view->right_x, view->up_x,
+                          frame->brick.origin_x, &axes[0]);
+  make_packet_camera_axis(view, u, v, length, view->eye_y, view->fwd_y, view->right_y, view->up_y,
+                          frame->brick.origin_y, &axes[1]);
+  make_packet_camera_axis(view, u, v, length, view->eye_z, view->fwd_z, view->right_z, view->up_z,
+                          frame->brick.origin_z, &axes[2]);
 }
 
 /// Planes of the brick as those of the whole volume, and positions the other way round.

@@ -134,13 +134,17 @@ ISO_CHECK_SIZE(BrickPlace, 36);
 typedef struct View {
   uint width, height;         ///< rays: those of the image, or several for each of its pixels along
                               ///< both axes
-  float eye_x, eye_y, eye_z;  ///< camera position, index space
+  float eye_x, eye_y, eye_z;  ///< camera position, index space; of parallel rays, the middle of
+                              ///< the plane that they start in
   /// Camera basis mapped to index space, divided by t_scale (see make_ray).
   float fwd_x, fwd_y, fwd_z, right_x, right_y, right_z, up_x, up_y, up_z;
-  float pixel_scale;  ///< tan(fovy / 2) / height: half a ray's step of u and v
-  float t_scale;      ///< power of two: ray parameter t of the kernels -> world units
+  /// Half a ray's step of u and v: tan(fovy / 2) / height; of parallel rays, half of their distance
+  /// [t of the kernels].
+  float pixel_scale;
+  float t_scale;     ///< power of two: ray parameter t of the kernels -> world units
+  uint is_parallel;  ///< 1: all rays have the direction fwd, and start at eye + u right + v up
 } View;
-ISO_CHECK_SIZE(View, 64);
+ISO_CHECK_SIZE(View, 68);
 
 /// The part of the rays that one level of detail draws [t of the kernels].
 typedef struct Band {
@@ -187,7 +191,7 @@ typedef struct FrameParams {
   ScreenBox screen;
   Schedule schedule;
 } FrameParams;
-ISO_CHECK_SIZE(FrameParams, 216);
+ISO_CHECK_SIZE(FrameParams, 220);
 
 #define ISO_NO_HIT 64u  ///< PairHit::cell of a pair that was tested and misses
 #define ISO_NOT_TESTED \

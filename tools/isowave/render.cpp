@@ -344,9 +344,12 @@ void set_up(RenderArgs &options, Drawing &drawing) {
   });
   add_choices(options, drawing);
   const bool fits_surface = options.frame.orbit == 0 && options.frame.cameras.empty();
-  if (!fits_surface) return;
-  drawing.cameras = {drawing.renderer->camera(
-      drawn_isovalues(drawing.volume(), options.frame.isovalues), drawing.views.size)};
+  if (fits_surface) {
+    drawing.cameras = {drawing.renderer->camera(
+        drawn_isovalues(drawing.volume(), options.frame.isovalues), drawing.views.size)};
+  }
+  if (options.parallel)
+    std::ranges::transform(drawing.cameras, drawing.cameras.begin(), in_parallel);
 }
 
 void run_render(const CLI::App &command, RenderArgs options) {

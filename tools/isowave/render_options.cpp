@@ -154,7 +154,7 @@ namespace {
 void group_render_options(CLI::App &command) {
   group_options(command, "Options of every day",
                 {"--help", "--isovalue", "--output", "--size", "--samples", "--orbit", "--cameras",
-                 "--color", "--background", "--normals", "--ambient", "--device"});
+                 "--parallel", "--color", "--background", "--normals", "--ambient", "--device"});
   group_volume_options(command);
   group_compression_options(command);
   group_options(command, "Precision and time",
@@ -189,6 +189,9 @@ void add_render_options(CLI::App &command, RenderArgs &options) {
                      "how to cut the volume, one brick per process: XxYxZ bricks along each axis, "
                      "or active to give each brick the same number of surface blocks [bricks of "
                      "equal size]");
+  command.add_flag("--parallel", options.parallel,
+                   "draw all views in parallel (orthographic) projection: what is as far away as "
+                   "the point that a camera looks at keeps its size");
   command.add_option("--color", options.color, "surface colour #RRGGBB")->capture_default_str();
   command.add_option("--background", options.background, "background colour #RRGGBB")
       ->capture_default_str();

@@ -81,6 +81,7 @@ ordered_json frame_json(double isovalue, std::size_t view, const Camera &camera,
                          {"uploaded_blocks", stats.uploaded_blocks},
                          {"uploaded_bytes", stats.uploaded_bytes},
                          {"cancelled", stats.cancelled}};
+  if (camera.parallel_height) result["camera"]["parallel_height"] = *camera.parallel_height;
   ordered_json passes = ordered_json::array();
   for (const PassStats &pass : stats.passes) passes.push_back(pass_json(pass));
   result["per_pass"] = std::move(passes);

@@ -3,16 +3,20 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 
 namespace isowave {
 
 /// x, y, z
 using Vector3 = std::array<double, 3>;
 
-/// A pinhole camera in world space.
+/// A camera in world space: a pinhole, or parallel projection.
 struct Camera {
   Vector3 eye{0, 0, 1}, at{0, 0, 0}, up{0, 1, 0};
   double fovy_degrees = 60;  ///< full angle between the picture's lower and upper edge, 0 to 180
+  /// Parallel (orthographic) projection: height of the picture [world units]. Depth is the distance
+  /// from the eye's plane, and what is behind that plane is not seen.
+  std::optional<double> parallel_height{};
 };
 
 struct ImageSize {

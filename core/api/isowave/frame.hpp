@@ -111,6 +111,7 @@ void for_each_field(Request &request, const Visit &visit) {
   visit("at", request.camera.at);
   visit("up", request.camera.up);
   visit("fovy_degrees", request.camera.fovy_degrees);
+  visit("parallel_height", request.camera.parallel_height);
   visit("isovalue", request.isovalue);
   visit("width", request.size.width);
   visit("height", request.size.height);

@@ -14,12 +14,21 @@ from isowave._placed import Placed
 
 @dataclasses.dataclass(frozen=True)
 class Camera:
-    """A pinhole camera in world space; vectors are (x, y, z)."""
+    """A camera in world space, a pinhole or of parallel projection; vectors are (x, y, z)."""
 
     eye: tuple[float, float, float]
     at: tuple[float, float, float]
     up: tuple[float, float, float] = (0.0, 1.0, 0.0)
-    fovy: float = 60.0  #: angle between the picture's lower and upper edge [degrees]
+    fovy: float = 60.0  #: pinhole: angle between the picture's lower and upper edge [degrees]
+    #: Parallel (orthographic) projection: height of the picture [world units]. Depth is the
+    #: distance from the eye's plane.
+    parallel_height: float | None = None
+
+    def pixel_size(self, height: int, distance: float) -> float:
+        """Height of a pixel, of `height` in a picture, at a distance [world units]."""
+        if self.parallel_height is not None:
+            return self.parallel_height / height
+        return distance * 2 * math.tan(math.radians(self.fovy) / 2) / height
 
     @staticmethod
     def orbit(volume: Placed[Any], count: int) -> list[Camera]:
@@ -47,14 +56,14 @@ class Camera:
 
     @staticmethod
     def from_pyvista(camera: Any) -> Camera:
-        """The view of a pyvista.Camera, or of a plotter's `camera`; of perspective projection."""
-        if getattr(camera, "parallel_projection", False):
-            raise ValueError("isowave has perspective cameras only, not of parallel projection")
+        """The view of a pyvista.Camera, or of a plotter's `camera`."""
+        is_parallel = getattr(camera, "parallel_projection", False)
         return Camera(
             vector(camera.position),
             vector(camera.focal_point),
             vector(camera.up),
             float(camera.view_angle),
+            2 * float(camera.parallel_scale) if is_parallel else None,
         )
 
 

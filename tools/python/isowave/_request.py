@@ -110,6 +110,7 @@ class Request:
             "at": self.camera.at,
             "up": self.camera.up,
             "fovy_degrees": self.camera.fovy,
+            "parallel_height": self.camera.parallel_height,
             "isovalue": self.isovalue,
             "width": self.size[0],
             "height": self.size[1],
@@ -150,6 +151,7 @@ def camera_of(camera: Any) -> Camera:
         vector(numbers("Camera.at", camera.at, 3)),
         vector(numbers("Camera.up", camera.up, 3)),
         number("Camera.fovy", camera.fovy),
+        optional("Camera.parallel_height", camera.parallel_height),
     )
 
 

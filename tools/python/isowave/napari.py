@@ -249,7 +249,7 @@ def mesh_of(
     with a ray for each pixel."""
     assert image.rgb is not None and image.depth is not None and image.position is not None
     depth = image.depth
-    pixel = 2 * math.tan(math.radians(image.camera.fovy) / 2) / depth.shape[0]  # at distance 1
+    pixel = image.camera.pixel_size(depth.shape[0], 1)
     ids = np.arange(depth.size).reshape(depth.shape)
     a, b, c, d = ids[:-1, :-1], ids[:-1, 1:], ids[1:, :-1], ids[1:, 1:]
     faces = np.stack([np.stack([a, c, b], axis=-1), np.stack([b, c, d], axis=-1)]).reshape(-1, 3)

@@ -38,9 +38,9 @@ from isowave._volume import Volume
 
 __all__ = ["Isosurface", "add_isosurface", "screenshot"]
 
-PARALLEL = "isosurfaces need a perspective camera: plotter.disable_parallel_projection()"
 TEXTURE = "isowaveFrame"
-PLANES = "isowavePlanes"  # the two numbers by which OpenGL's projection maps distances to depths
+# Two numbers by which OpenGL's projection maps distances to depths, and 1: it is parallel.
+PLANES = "isowavePlanes"
 
 # The actor's bounds must be the volume's: PyVista sets cameras and clipping planes by them. So its
 # points are the corners of the volume's box. The shader moves the first four to the corners of the
@@ -63,7 +63,8 @@ FRAGMENT = {
   ivec2 isowaveTexel = min(ivec2(isowavePlace * vec2(isowaveSize)), isowaveSize - 1);
   vec4 isowavePixel = texelFetch({TEXTURE}, isowaveTexel, 0);
   if (isowavePixel.a <= 0.0) {{ discard; }}
-  float isowaveDepth = {PLANES}.y / isowavePixel.a - {PLANES}.x;
+  float isowaveDepth = {PLANES}.z > 0.0 ? {PLANES}.y - {PLANES}.x * isowavePixel.a
+                                        : {PLANES}.y / isowavePixel.a - {PLANES}.x;
   if (abs(isowaveDepth) > 1.0) {{ discard; }}
   gl_FragDepth = 0.5 * isowaveDepth + 0.5;
 """,
@@ -143,7 +144,8 @@ class Isosurface:
                 self._drawn = wanted
             projection = projection_of(renderer)
             uniforms = self.actor.GetShaderProperty().GetFragmentCustomUniforms()
-            uniforms.SetUniform2f(PLANES, [projection[2, 2], projection[2, 3]])
+            is_parallel = float(view.camera.parallel_height is not None)
+            uniforms.SetUniform3f(PLANES, [projection[2, 2], projection[2, 3], is_parallel])
             self.error = None
         except Exception as error:  # noqa: BLE001: VTK would print it, and go on
             self._show(np.zeros((1, 1, 4), np.float32))
@@ -182,7 +184,7 @@ def add_isosurface(
     Parameters
     ----------
     plotter
-        Its scene has a perspective camera; its active one where there are several.
+        The surface is in its active scene.
     volume
         In the scene's world space; isowave.compress(pyvista.ImageData) is where the image is.
     isovalue
@@ -201,14 +203,8 @@ def add_isosurface(
     Isosurface
         With it, isovalue and colour are changed, and the surface is removed.
 
-    Raises
-    ------
-    ValueError
-        A scene whose camera has parallel projection, in one line. Where that is found when a scene
-        is drawn, there is a warning, and screenshot() raises.
+    A scene that cannot be drawn gets a warning, and screenshot() raises ValueError.
     """
-    if plotter.renderer.GetActiveCamera().GetParallelProjection():
-        raise ValueError(PARALLEL)
     request = Request(
         isovalue,
         color=color,
@@ -257,8 +253,7 @@ class View:
 def view_of(renderer: Any) -> View:
     """The view by the matrices that VTK is about to draw with."""
     camera, aspect = renderer.GetActiveCamera(), renderer.GetTiledAspectRatio()
-    if camera.GetParallelProjection():
-        raise ValueError(PARALLEL)
+    is_parallel = bool(camera.GetParallelProjection())
     part = part_of(renderer)
     if min(part) < 1:
         raise ValueError("isosurfaces need a view of at least one pixel")
@@ -268,7 +263,8 @@ def view_of(renderer: Any) -> View:
         raise ValueError("isosurfaces need a camera that does not scale the scene")
     if not np.isclose(projection[0, 0] * aspect, projection[1, 1]):
         raise ValueError("isosurfaces need a camera with square pixels")
-    shift = projection[:2, 2]  # of the middle, in halves of the part
+    # Of the middle, in halves of the part.
+    shift = -projection[:2, 3] if is_parallel else projection[:2, 2]
     exact = part * (1 + np.abs(shift))
     whole = np.rint(exact).astype(int)
     if np.abs(exact - whole).max() > 0.01:
@@ -276,9 +272,10 @@ def view_of(renderer: Any) -> View:
     corner = np.where(shift > 0, whole - part, 0)
     eye = -rotation.T @ view[:3, 3]
     towards = eye - camera.GetDistance() * rotation[2]
-    fovy = math.degrees(2 * math.atan(whole[1] / part[1] / projection[1, 1]))
+    half = whole[1] / part[1] / projection[1, 1]  # of the whole's height; of a pinhole, at 1
+    lens = (60.0, 2 * half) if is_parallel else (math.degrees(2 * math.atan(half)), None)
     return View(
-        Camera(vector(eye), vector(towards), vector(rotation[1]), fovy),
+        Camera(vector(eye), vector(towards), vector(rotation[1]), *lens),
         (int(whole[0]), int(whole[1])),
         (int(corner[0]), int(corner[1])),
         part,
@@ -308,8 +305,10 @@ def matrix_of(matrix: Any) -> npt.NDArray[np.float64]:
 def eye_depth(image: Image) -> npt.NDArray[np.float64]:
     """Distance from the eye's plane [world units], (height, width); inf: no surface."""
     assert image.depth is not None
+    if image.camera.parallel_height is not None:
+        return np.asarray(image.depth, np.float64)
     height, width = image.depth.shape
-    pixel = 2 * math.tan(math.radians(image.camera.fovy) / 2) / height
+    pixel = image.camera.pixel_size(height, 1)
     x = pixel * (np.arange(width) + 0.5 - width / 2)
     y = pixel * (np.arange(height) + 0.5 - height / 2)
     return np.asarray(image.depth / np.sqrt(1 + x[None, :] ** 2 + y[:, None] ** 2), np.float64)

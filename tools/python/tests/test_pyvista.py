@@ -3,6 +3,7 @@
 The volume holds distances from the origin: its isosurface at R is a sphere of radius R.
 """
 
+import math
 import warnings
 
 import numpy as np
@@ -306,25 +307,25 @@ def test_translucent_mesh_is_blended_over_it(plotter, volume):
     assert red > 60 and blue > 60
 
 
-def test_parallel_projection_is_refused(plotter, volume):
+def test_parallel_projection(plotter, volume):
+    """The surface covers what a mesh of it covers, and hides what is behind it."""
     surface = adapter.add_isosurface(plotter, volume, RADIUS, color=GREY)
     plotter.enable_parallel_projection()
-    with pytest.raises(ValueError, match="perspective"):
-        adapter.screenshot(plotter)
-    with pytest.warns(RuntimeWarning, match="no isosurface is shown: .*perspective"):
-        plotter.render()
-    assert not is_grey(plotter.screenshot(return_img=True)).any()
-    for attempt in (
-        lambda: adapter.add_isosurface(plotter, volume, RADIUS),
-        lambda: isowave.Camera.from_pyvista(plotter.camera),
-    ):
-        with pytest.raises(ValueError, match="perspective") as caught:
-            attempt()
-        assert "\n" not in str(caught.value)
+    shown = is_grey(adapter.screenshot(plotter))
+    assert surface.error is None
+    view = isowave.Camera.from_pyvista(plotter.camera)
+    assert view.parallel_height == 2 * plotter.camera.parallel_scale
+    pixel = view.pixel_size(SIZE[1], 1)
+    radius = math.sqrt(shown.sum() / math.pi) * pixel
+    assert radius == pytest.approx(RADIUS, rel=0.03)
+    add_ball(plotter, (0, 0, -0.5 * RADIUS), radius=0.2 * RADIUS)
+    assert (is_grey(adapter.screenshot(plotter)) == shown).all()
+    near = np.array(plotter.camera.position)
+    near *= 1.2 * RADIUS / np.linalg.norm(near)
+    add_ball(plotter, tuple(near), radius=0.2 * RADIUS)
+    assert is_grey(adapter.screenshot(plotter)).sum() < shown.sum()
     plotter.disable_parallel_projection()
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        assert is_grey(adapter.screenshot(plotter)).any() and surface.error is None
+    assert is_grey(adapter.screenshot(plotter)).any()
 
 
 def test_what_cannot_be_drawn(plotter, volume):

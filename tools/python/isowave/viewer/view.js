@@ -132,6 +132,9 @@ export function readCamera(text) {
   if (typeof first !== "object" || first === null) {
     throw new Error('This is no camera: "cameras" with "eye", "at" and "up" is missing.');
   }
+  if (first.parallel_height !== undefined) {
+    throw new Error('This page draws in perspective alone: leave out "parallel_height".');
+  }
   return checkCamera({ up: [0, 1, 0], ...first, fovy_deg: file.fovy_deg ?? 60 });
 }
 
