@@ -20,9 +20,9 @@ class SurfaceBlocks {
     Gradients gradients = Gradients::kNone;
     std::uint64_t memory_budget = 0;          ///< bound on all device memory [bytes]
     StreamPlace stream = StreamPlace::kAuto;  ///< where the compressed volume is
-    /// Of what the owner keeps on the device as long as this, beside what is here.
+    /// What the owner keeps on the device as long as this, beside what is here.
     ocl::BufferSizes beside{};
-    /// Of a Wavefront: a picture, or one ray.
+    /// Rays of the Wavefront: a picture's, or one.
     std::uint64_t num_rays = 1;
   };
 
@@ -86,7 +86,7 @@ class SurfaceBlocks {
   std::uint32_t num_cached() const { return num_cached_; }
   std::uint64_t num_decoded() const { return num_decoded_; }  ///< so far
   std::uint64_t budget() const { return budget_; }
-  /// Of all buffers that live as long as this, those of `beside` among them.
+  /// Bytes of all buffers that live as long as this, but the cache's; those of `beside` included.
   std::uint64_t fixed_bytes() const { return fixed_bytes_; }
   /// The hits of a picture, and what cache and decoder use of frames.
   Wavefront &rays() { return rays_; }

@@ -49,7 +49,7 @@ struct Uploads {
 
 class BlockStore {
  public:
-  /// The finest level alone, for whoever knows how many slots it takes.
+  /// The finest level alone, with as many slots as the limits say.
   ///
   /// volume  of `stream`, which is on the device or on its way there
   /// Waits   yes
