@@ -422,23 +422,6 @@ TEST_P(GrowingCacheOnDevice, AfterFramesThatWereStopped) {
   }
 }
 
-/// What a frame's ambient rays need is the frame's.
-TEST_P(GrowingCacheOnDevice, UntilAmbientRaysFit) {
-  if (is_simulator(GetParam().device)) GTEST_SKIP() << "takes a simulator too long";
-  DeviceRenderer renderer = renderer_of({.first_slots = 16, .with_given_rays = true});
-  FrameRequest request{.camera = camera_, .isovalue = kIsovalue};
-  for (int frame = 0; frame < 8; ++frame) draw(renderer, request);
-  const std::uint32_t of_camera = renderer.memory_plan().cache_slots;
-  request.ambient_rays = 6;
-  std::uint64_t num_decoded = 1;
-  for (int frame = 0; frame < 8 && num_decoded != 0; ++frame) {
-    const FrameStats stats = draw(renderer, request);
-    num_decoded = decoded(stats) + stats.ambient.decoded_blocks;
-  }
-  EXPECT_GT(renderer.memory_plan().cache_slots, of_camera) << "else this scene tests nothing";
-  EXPECT_EQ(num_decoded, 0u);
-}
-
 /// A cache grows between frames with ambient rays, and between lists of rays.
 TEST_P(GrowingCacheOnDevice, WithRaysOfAnyOrigin) {
   if (is_simulator(GetParam().device)) GTEST_SKIP() << "takes a simulator too long";
