@@ -11,7 +11,7 @@ void active_blocks(benchmark::State &state) {
   measure(
       state, {cells, 32 * cells + 4.0 * in.num_listed}, [] {},
       [&] {
-        in.listed.count(in.frame, in.macrocells.masks());
+        in.listed.count(in.frame, in.blocks.levels[0].macrocells.masks());
         in.listed.list(in.frame, in.surface->block_ids);
       });
   state.counters["listed"] = in.num_listed;

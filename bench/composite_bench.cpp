@@ -36,15 +36,15 @@ struct CompositeInput : FrameRig {
   /// A ray's pairs up to the one that decides: its first hit, or where it has no more blocks.
   std::size_t count_pairs_looked_at() const {
     const PassCounts pass = read_counts();
-    std::vector<uint> blocks(pass.pair_slot_count);
+    std::vector<uint> block_ids(pass.pair_slot_count);
     std::vector<PairHit> results(pass.pair_slot_count);
-    rays.pair_block_ids.read(blocks);
+    rays.pair_block_ids.read(block_ids);
     rays.pair_hits.read(results);
     std::size_t count = 0;
     for (std::size_t ray = 0; ray < pass.window_count; ++ray) {
       std::size_t pair = ray * pass.spec_count;
       const std::size_t end = pair + pass.spec_count;
-      while (pair < end && blocks[pair] != ISO_INVALID_ID && results[pair].cell == ISO_NO_HIT)
+      while (pair < end && block_ids[pair] != ISO_INVALID_ID && results[pair].cell == ISO_NO_HIT)
         ++pair;
       count += std::min(pair + 1, end) - ray * pass.spec_count;
     }

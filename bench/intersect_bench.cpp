@@ -56,17 +56,17 @@ struct IntersectInput : FrameRig {
   void verify() {
     counts = read_counts();
     const std::vector<HitRecord> expected = render_scalar(params, slab_voxels());
-    std::vector<uint> active(counts.active_count), blocks(counts.pair_slot_count);
+    std::vector<uint> active(counts.active_count), block_ids(counts.pair_slot_count);
     std::vector<PairHit> got(counts.pair_slot_count);
     rays.active_ray_ids.read(active);
-    rays.pair_block_ids.read(blocks);
+    rays.pair_block_ids.read(block_ids);
     rays.pair_hits.read(got);
     std::size_t num_hits = 0;
     for (std::size_t pair = 0; pair < got.size(); ++pair) {
       const HitRecord &hit = expected[active[pair]];
       if (got[pair].cell >= ISO_NO_HIT) continue;
       ++num_hits;
-      check(hit.block_id == blocks[pair] && hit.cell == got[pair].cell, "cell that a ray hits");
+      check(hit.block_id == block_ids[pair] && hit.cell == got[pair].cell, "cell that a ray hits");
     }
     check(num_hits > active.size() / 10 * 9, "number of rays that hit");
   }

@@ -32,20 +32,20 @@ struct TraverseInput : FrameRig {
   void verify() {
     counts = read_counts();
     const std::vector<uint> masks = macrocells.masks().read();
-    std::vector<uint> blocks(counts.pair_slot_count);
-    rays.pair_block_ids.read(blocks);
+    std::vector<uint> block_ids(counts.pair_slot_count);
+    rays.pair_block_ids.read(block_ids);
     check(counts.spec_count == params.schedule.max_spec_count && counts.active_count > 0, "N_Spec");
     const uint coarse_x = (params.grid.blocks_x + 3) / 4, coarse_y = (params.grid.blocks_y + 3) / 4;
     uint num_pairs = 0;
-    for (std::size_t pair = 0; pair < blocks.size(); ++pair) {
-      if (blocks[pair] == ISO_INVALID_ID) continue;
+    for (std::size_t pair = 0; pair < block_ids.size(); ++pair) {
+      if (block_ids[pair] == ISO_INVALID_ID) continue;
       ++num_pairs;
       check(params.schedule.scanned_pairs || pair % counts.spec_count == 0 ||
-                blocks[pair - 1] != ISO_INVALID_ID,
+                block_ids[pair - 1] != ISO_INVALID_ID,
             "order of a ray's blocks");
-      const uint x = blocks[pair] % params.grid.blocks_x,
-                 y = blocks[pair] / params.grid.blocks_x % params.grid.blocks_y,
-                 z = blocks[pair] / params.grid.blocks_x / params.grid.blocks_y;
+      const uint x = block_ids[pair] % params.grid.blocks_x,
+                 y = block_ids[pair] / params.grid.blocks_x % params.grid.blocks_y,
+                 z = block_ids[pair] / params.grid.blocks_x / params.grid.blocks_y;
       const std::size_t cell = x / 4 + coarse_x * (y / 4 + std::size_t{coarse_y} * (z / 4));
       const uint bit = x % 4 + 4 * (y % 4) + 16 * (z % 4);
       check((masks[2 * cell + bit / 32] >> (bit % 32) & 1u) == 1u, "block without the isovalue");
