@@ -58,11 +58,12 @@ class FrameCacheOnDevice : public testing::TestWithParam<PipelineOnDevice> {
   /// pipeline `blocks` asks for, and those of its normals.
   std::vector<std::uint32_t> blocks_read(const TestVolume &volume, ImageSize size,
                                          const std::vector<Camera> &cameras) {
-    DeviceRenderer ample(device_, volume.compressed,
-                   {.size = size,
-                    .pipeline = blocks_pipeline(),
-                    .cache_slots = static_cast<std::uint32_t>(volume.compressed.block_count()),
-                    .max_speculation = 1});
+    DeviceRenderer ample(
+        device_, volume.compressed,
+        {.size = size,
+         .pipeline = blocks_pipeline(),
+         .cache_slots = static_cast<std::uint32_t>(volume.compressed.block_count()),
+         .max_speculation = 1});
     std::vector<std::uint32_t> counts;
     for (const Camera &camera : cameras) {
       ample.clear_cache();

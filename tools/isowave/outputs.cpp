@@ -25,7 +25,7 @@ namespace {
 std::string key_of(const fs::path &path) {
   const fs::path target = follow_links(path);
   std::error_code failure, no_folder;
-  const std::string key = platform::identity_of(target, failure);
+  std::string key = platform::identity_of(target, failure);
   if (!failure) return key;
   const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
   const std::string folder_key = platform::identity_of(folder, no_folder);

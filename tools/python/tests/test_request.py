@@ -48,6 +48,7 @@ def test_arguments_reach_the_request_by_their_names(monkeypatch: pytest.MonkeyPa
         "at": (0, 0, 0),
         "up": (0, 1, 0),
         "fovy_degrees": 45,
+        "parallel_height": None,
         "isovalue": 80,
         "width": 64,
         "height": 48,
