@@ -357,15 +357,15 @@ TEST(AmbientHost, FramesEqualTheTwin) {
           .camera = camera, .isovalue = kIsovalue, .size = size, .ambient_rays = 5};
       const FrameStats stats = host.render(request);
       EXPECT_EQ(host.open().counts.size(), open.counts.size());
+      const std::vector<HitRecord> hits = host.hits();
       for (std::size_t i = 0; i < open.counts.size(); ++i) {
-        if (std::isfinite(host.hits()[i].t)) {
+        if (std::isfinite(hits[i].t)) {
           ASSERT_EQ(host.open().counts[i], open.counts[i]);
         }
       }
       const FrameParams frame = make_frame_params(volume.info(), camera, size, kIsovalue);
       const ShadeParams shading = make_shade_params(volume.info(), {});
-      EXPECT_EQ(host.shade().pixels,
-                shade_scalar(frame, shading, host.hits(), size.samples, open).pixels);
+      EXPECT_EQ(host.shade().pixels, shade_scalar(frame, shading, hits, size.samples, open).pixels);
       EXPECT_GT(stats.ambient.ms, 0);
     }
   }

@@ -307,10 +307,9 @@ TEST(HostRenderer, BandsGrowFromTheTopAndCanBeStopped) {
     done = pass.completed_percent;
     const auto rows = static_cast<std::size_t>(std::lround(done * size.height / 100));
     const std::size_t drawn = rows * size.width;
-    EXPECT_EQ(std::memcmp(renderer.hits().data(), whole.data(), drawn * sizeof(HitRecord)), 0);
-    EXPECT_EQ(
-        test::num_hits({renderer.hits().begin() + std::ptrdiff_t(drawn), renderer.hits().end()}),
-        0u);
+    const std::vector<HitRecord> so_far = renderer.hits();
+    EXPECT_EQ(std::memcmp(so_far.data(), whole.data(), drawn * sizeof(HitRecord)), 0);
+    EXPECT_EQ(test::num_hits({so_far.begin() + std::ptrdiff_t(drawn), so_far.end()}), 0u);
     EXPECT_EQ(renderer.shade().pixels.size(), 3 * size.num_pixels());
     return true;
   };
