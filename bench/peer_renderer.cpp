@@ -77,7 +77,7 @@ class RendererSide : public PeerSide {
   CompressedVolume volume_;
   Camera camera_;
   ImageSize size_;
-  /// Of the last frame, so that a new isovalue's masks have to be made again.
+  /// The last frame's isovalue. A new isovalue's masks have to be made again.
   float previous_ = 0;
   Measured opened_;
   std::optional<ocl::Device> device_;  ///< before the renderer, which it must outlive

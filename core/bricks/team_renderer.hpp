@@ -92,7 +92,7 @@ class TeamRenderer : public Renderer {
   void compose_colors(std::span<const std::uint32_t> colors, Image8 &image);
   /// A word of each ray.
   void compose(Receiver who, const MakeWords &make, const TakeWords &take);
-  /// Of bricks' hits, those that win.
+  /// The hits that win among all bricks'.
   std::vector<HitRecord> compose_hits(std::span<const HitRecord> own,
                                       std::span<const HitField> fields,
                                       Receiver who = Receiver::kRank0);

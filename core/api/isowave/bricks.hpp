@@ -42,7 +42,7 @@ struct BrickOptions {
   RendererOptions renderer{};  ///< of each process
 };
 
-/// A renderer of which each process draws a brick. All processes make the same calls; rank 0 gets
+/// A renderer for several processes, each with a brick. All make the same calls; rank 0 gets
 /// the frames of the whole volume, the others frames of statistics alone. Statistics are this
 /// process's, except hits. What goes wrong at one process is thrown at all, so that none waits.
 /// Requests have no positions and hits.
