@@ -118,10 +118,8 @@ void make_renderer(RenderArgs &options, Drawing &drawing) {
     drawing.on_device = &renderer->renderer();
     drawing.renderer = std::move(renderer);
   } else {
-    CompileReport compiling(*drawing.device);
     auto renderer =
         std::make_unique<DeviceRenderer>(*drawing.device, drawing.whole, options.renderer);
-    compiling.finish();
     drawing.on_device = renderer.get();
     drawing.renderer = std::move(renderer);
   }
@@ -333,6 +331,9 @@ void set_up(RenderArgs &options, Drawing &drawing) {
     if (drawing.team.rank() == 0) outputs = check_outputs(options, drawing.views.count);
     if (!options.reference) drawing.device = open_device(options, drawing.is_team());
   });
+  // Compressing the volume compiles kernels, too.
+  std::optional<CompileReport> compiling;
+  if (drawing.device && !drawing.is_team()) compiling.emplace(*drawing.device);
   if (drawing.is_team()) {
     load_bricks(options, drawing);
   } else {
@@ -342,6 +343,7 @@ void set_up(RenderArgs &options, Drawing &drawing) {
     outputs.make_folder();
     make_renderer(options, drawing);
   });
+  if (compiling) compiling->finish();
   add_choices(options, drawing);
   const bool fits_surface = options.frame.orbit == 0 && options.frame.cameras.empty();
   if (fits_surface) {
