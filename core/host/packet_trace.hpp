@@ -15,7 +15,7 @@ namespace isowave::core::ISO_PACKET_NAMESPACE {
 
 static_assert(kDefaultSolver.kind == ISO_SOLVER_BERNSTEIN, "there is no other here");
 
-// ---- Where blocks come from: see packet_walk.h.
+// ---- Where blocks come from: see packet_regions.h.
 
 using PacketField = HostField;
 
