@@ -29,7 +29,7 @@ constexpr std::uint64_t kRaysPerUsefulSlot = 8;
 
 /// A surface of a volume of n^3 blocks is in about n^2. Of turbulence, a cold frame of pipeline
 /// `rays` decodes 6 n^2, of 256^3 voxels as of 1024^3; pipeline `blocks`, which asks for whole dual
-/// grids, 9.6 n^2 (bench/README.md).
+/// grids, 9.6 n^2 (bench/h100.md).
 constexpr double kSlotsPerFace = 12;
 /// A small picture needs a smaller cache: at most 5 slots per 8 rays.
 constexpr std::uint64_t kRaysPerSlot = 8, kSlotsOfThose = 5;
