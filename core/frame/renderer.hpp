@@ -46,7 +46,8 @@ inline ImageSize size_of(const FrameRequest &request, const Abilities &abilities
   return request.size.value_or(abilities.largest);
 }
 
-/// Not thread-safe. Of a team's renderers, all make the same calls in the same order.
+/// Turns requests into pictures. Not thread-safe. All processes of a team make the same calls in
+/// the same order.
 class Renderer {
  public:
   virtual ~Renderer() = default;

@@ -70,7 +70,7 @@ struct BenchPaperArgs {
   bool quick = false;
 };
 
-/// Of the protocol, what --quick leaves.
+/// The part of the protocol that --quick leaves.
 constexpr std::uint32_t kQuickIsovalues = 4, kQuickViews = 2;
 constexpr const char *kQuickSize = "640x360";
 

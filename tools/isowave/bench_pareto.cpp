@@ -294,7 +294,7 @@ void print_header() {
              "wrong", "depth p99", "normal", "FLIP", "PSNR");
 }
 
-/// Of the range of values, which may be none.
+/// The error as a part of the range of values, which may be 0 if the error is 0.
 double part_of(double value_range, double voxel_error) {
   return voxel_error == 0 ? 0 : voxel_error / value_range;
 }

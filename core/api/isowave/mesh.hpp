@@ -42,7 +42,8 @@ struct ExtractOptions {
 struct Mesh {
   /// World space; rounded if Volume::float32_positions().
   std::vector<Vector3> vertices{};
-  /// Of vertices: length 1, away from larger values, world space; empty without normals.
+  /// A normal of each vertex, in world space, of length 1, away from larger values; empty without
+  /// normals.
   std::vector<std::array<float, 3>> normals{};
   /// Numbers of vertices, counter-clockwise seen from where values are lower.
   std::vector<std::array<std::uint32_t, 3>> triangles{};

@@ -80,8 +80,7 @@ class BrickRenderer(Placed[_core.Renderer]):
         A .zfp file, of which each process reads its blocks alone, or another volume, as
         isowave.open(): each reads its layers, and compresses its brick.
     comm
-        A communicator of mpi4py's: MPI.COMM_WORLD. Of a machine's processes, each takes one of its
-        devices.
+        A communicator of mpi4py, e.g. MPI.COMM_WORLD. The processes of a machine share its devices.
     device, size, samples, memory_budget, cache_blocks, rays
         As Renderer's, of each process; devices with commas between are taken in turn.
     levels

@@ -26,11 +26,11 @@ class Level:
     """The voxels of a level of detail, (z, y, x), as an array that indexing decodes.
 
     Made by Volume.levels. Indexing takes what numpy takes, and gives numpy arrays of float32 (a
-    number, if all three indices are integers). Of a file, only the blocks of 4 x 4 x 4 voxels
-    that hold what is asked for are read and decoded; lists and arrays of indices decode what lies
-    between the least and the largest, too. numpy.asarray(level) decodes everything;
-    dask.array.from_array(level, chunks=...) decodes chunks when they are computed: with sides that
-    are multiples of 4, no block twice.
+    number, if all three indices are integers). Only the blocks of 4 x 4 x 4 voxels that hold what
+    is asked for are read from a file, and decoded. Lists and arrays of indices also decode the
+    voxels between the least and the largest index. numpy.asarray(level) decodes everything.
+    dask.array.from_array(level, chunks=...) decodes chunks when they are computed; if the sides of
+    chunks are multiples of 4, no block is decoded twice.
     """
 
     ndim = 3

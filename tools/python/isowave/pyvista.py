@@ -263,7 +263,7 @@ def view_of(renderer: Any) -> View:
         raise ValueError("isosurfaces need a camera that does not scale the scene")
     if not np.isclose(projection[0, 0] * aspect, projection[1, 1]):
         raise ValueError("isosurfaces need a camera with square pixels")
-    # Of the middle, in halves of the part.
+    # The middle's shift, in halves of the part.
     shift = -projection[:2, 3] if is_parallel else projection[:2, 2]
     exact = part * (1 + np.abs(shift))
     whole = np.rint(exact).astype(int)
