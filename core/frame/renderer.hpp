@@ -62,9 +62,8 @@ class Renderer {
 
   /// Draws one frame, and waits for it.
   ///
-  /// Throws  Error: what check() refuses; a degenerate camera; a NaN isovalue. The next frame is
-  /// not
-  ///         affected
+  /// Throws  Error: what check() refuses; a degenerate camera; a NaN isovalue. The renderer can
+  ///         draw further frames afterwards
   virtual FrameStats render(const FrameRequest &request) = 0;
 
   /// The first hit of each ray, in the finest level of detail. t counts in lengths of the ray's

@@ -1,27 +1,25 @@
-// The JSON, of each volume and method. Summaries have mean, median, min, max, count; null: of
-// nothing.
+// The JSON, for each volume and method. Summaries have mean, median, min, max, count; null: there
+// are no values.
 //
 //   new_ms         frames of an isovalue that was not drawn before, from the first camera; caches
 //                  are as the frames before have left them
 //   next_ms        the same isovalue from the other cameras
-//   cold_ms        as new_ms, but nothing is decoded beforehand; of rays from all cameras
-//   visible_blocks of a pass: distinct blocks in which rays are intersected (pipeline blocks)
-//   active_blocks  distinct blocks that are decoded for a picture: for a cold frame of rays, or a
-//                  mesh
-//   touched_blocks of a pass: distinct blocks whose voxels its rays look at; of what progress is of
-//   n_spec         of a pass: blocks that a ray is to look ahead at, mean of its rays
-//   utilization    of a pass: ray-block pairs that are intersected, per pixel
-//   completed      after each pass: rays that have ended, of all pixels, or of those that met an
-//                  active block; a frame that is through counts as 100
-//   progress       of cold first views, waited for after each pass: ms since the frame's beginning
-//   look_ahead     "global", the paper's; "per-ray"; "off"; "scanned": global, but what rays with
-//   few
-//                  blocks before them leave goes to others
+//   cold_ms        as new_ms, but nothing is decoded beforehand; rays: from all cameras
+//   visible_blocks distinct blocks in which a pass intersects rays (pipeline blocks)
+//   active_blocks  distinct blocks that are decoded for a cold frame of rays, or for a mesh
+//   touched_blocks distinct blocks whose voxels the rays of a pass look at, in cold first views
+//   n_spec         blocks that the rays of a pass are to look ahead at, mean
+//   utilization    ray-block pairs that a pass intersects, per pixel
+//   completed      rays that have ended after each pass, among all pixels, or among those that met
+//                  an active block; a finished frame counts as 100
+//   progress       ms since the frame's beginning after each pass of cold first views, with a wait
+//                  after each pass
+//   look_ahead     "global", the paper's; "per-ray"; "off"; "scanned": global, but rays with few
+//                  blocks before them leave places to others
 //   limits         cold frames of a tenth of the isovalues, from two cameras, by the most blocks
-//   that
-//                  rays look ahead at
-//   cache          of rays: "default" slots, or as many as the cold frames needed at most, "one
-//                  frame"
+//                  that rays look ahead at
+//   cache          "default" slots of rays, or "one frame": as many as the cold frames needed at
+//                  most
 //   device_bytes   the peak of all buffers; cache_bytes: those of the block cache among them
 
 #include "tools/isowave/bench_paper.hpp"

@@ -48,8 +48,7 @@ class Renderer {
   /// Draws a frame and waits for it. Decoded blocks are kept for further frames.
   ///
   /// Throws  Error: a request that the renderer was not made for, a degenerate camera, a NaN, a
-  /// file
-  ///         that cannot be read. The renderer can draw further frames afterwards
+  ///         file that cannot be read. The renderer can draw further frames afterwards
   Frame render(const FrameRequest &request);
 
   /// Finds the first hit of each ray in the finest level of detail. Returns a frame of one row with

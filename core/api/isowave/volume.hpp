@@ -167,10 +167,9 @@ using ReadLayers =
 /// at once: arrays in chunked stores, simulations.
 ///
 /// read     called for ascending layers, by one thread at a time, not always the calling one
-/// keep     Keeps layers in a temporary file (TMPDIR) of the volume's size if compression reads
-/// them
-///          twice; read() is then called once for each layer. false: read() is called again, from
-///          front to back. Compression reads once at a rate, and float32 by default.
+/// keep     Keeps layers that compression needs twice in a temporary file (TMPDIR) of the volume's
+///          size; read() is then called once for each layer. false: read() is called again, from
+///          front to back. At a rate, and with float32 by default, layers are needed once.
 /// Throws   Error: as above; what read() throws, as Error
 std::shared_ptr<const Volume> compress(const ReadLayers &read, VoxelType type, const Grid &grid,
                                        const Compression &compression = {}, bool keep = true);
