@@ -291,14 +291,14 @@ void add_bench_paper(CLI::App &bench) {
   const auto options = std::make_shared<BenchPaperArgs>();
   command
       ->add_option("VOLUME", options->inputs,
-                   "a .zfp file, " + std::string(kVolumeHelp) + "; of a folder, all volumes in it")
+                   "a .zfp file, " + std::string(kVolumeHelp) + ", or a folder: all volumes in it")
       ->required();
   CLI::Option *isovalues =
-      command->add_option("--isovalues", options->isovalues, "random isovalues, seeded")
+      command->add_option("--isovalues", options->isovalues, "number of random isovalues")
           ->check(CLI::Range(1u, 10000u))
           ->capture_default_str();
   CLI::Option *views =
-      command->add_option("--views", options->views, "views on an orbit, of each isovalue")
+      command->add_option("--views", options->views, "views on an orbit, for each isovalue")
           ->check(CLI::Range(1u, 1000u))
           ->capture_default_str();
   CLI::Option *size =
@@ -311,8 +311,8 @@ void add_bench_paper(CLI::App &bench) {
           ->capture_default_str();
   command
       ->add_option("--limits", options->limits,
-                   "most blocks to look ahead at, 1 to 64, by which passes and decoded blocks are "
-                   "compared; a list")
+                   "most blocks that a ray may look ahead at, 1 to 64, to compare passes and "
+                   "decoded blocks; a list")
       ->check(CLI::Range(1u, 64u))
       ->delimiter(',')
       ->allow_extra_args(false)
@@ -322,25 +322,26 @@ void add_bench_paper(CLI::App &bench) {
                    "isovalues of interest, LOW HIGH [the middle 80 % of the values]")
       ->expected(2)
       ->check(fits_float32());
-  command->add_option("--seed", options->seed, "of the isovalues")->capture_default_str();
+  command->add_option("--seed", options->seed, "seed of the isovalues")->capture_default_str();
   command
       ->add_option("--bcmc-budget", options->bcmc_budget,
-                   "memory budget of Block-Compressed Marching Cubes where that is bounded [what "
-                   "pipeline rays takes with slots for a frame]")
+                   "memory budget of bounded Block-Compressed Marching Cubes [memory of pipeline "
+                   "rays with slots for a frame]")
       ->transform(byte_count())
       ->type_name("BYTES");
-  command->add_flag("--quick", options->quick,
-                    fmt::format("{} isovalues, {} views, {}, no further sizes, but what is asked "
-                                "for: shows that all works",
-                                kQuickIsovalues, kQuickViews, kQuickSize));
+  command->add_flag(
+      "--quick", options->quick,
+      fmt::format("{} isovalues, {} views, {}, no further sizes, unless other options "
+                  "say otherwise: shows that all works",
+                  kQuickIsovalues, kQuickViews, kQuickSize));
   add_volume_options(*command, options->volume);
   add_compression_options(*command, options->compression);
   command->add_option("--device", options->device,
                       "device: index, cpu, gpu, or a part of its name");
   command->add_option("--pictures", options->pictures,
-                      "a folder for two pictures of each volume: its first view by rays, and by "
+                      "folder for two pictures of each volume: its first view by rays, and by "
                       "triangles");
-  command->add_option("--json", options->json, "write all that was measured");
+  command->add_option("--json", options->json, "file for all results, as JSON");
   command->callback([=] {
     if (options->quick) {
       if (isovalues->count() == 0) options->isovalues = kQuickIsovalues;
