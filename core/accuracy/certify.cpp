@@ -42,7 +42,8 @@ class BlockValues {
            glm::all(glm::lessThan(block, glm::ivec3(volume_.num_blocks() - brick.behind)));
   }
 
-  /// Of a dual cell: both bounds of the field, minus the isovalue, as kernels compute them.
+  /// Both bounds of the field at a dual cell's corners, minus the isovalue, as kernels compute
+  /// them.
   void corners(const glm::ivec3 &cell, float isovalue, std::array<float, 8> &lower,
                std::array<float, 8> &upper) {
     const glm::uvec3 blocks = volume_.num_blocks(), first(in_brick(cell));

@@ -20,9 +20,9 @@
 namespace isowave::core {
 
 struct Certificate {
-  /// Of each ray: the distance between the drawn and the true hit along it, at most [pixels: what a
-  /// pixel covers at the drawn hit's distance]; 0 where both miss for certain; infinity where
-  /// nothing is certain.
+  /// [ray] Largest possible distance between the drawn and the true hit along the ray [pixels: what
+  /// a pixel covers at the drawn hit's distance]; 0 if both miss for certain; infinity if nothing
+  /// is certain.
   std::vector<float> bounds;
   double total_ms = 0;  ///< wall clock, of both bounds' frames and what the host makes of them
   std::uint64_t decoded_blocks = 0;  ///< for them, by all ranks

@@ -68,7 +68,7 @@ std::uint32_t block_layers(const VolumeInfo &info) {
   return (info.dims.z + 3) / 4;
 }
 
-/// Of layers of blocks of a level.
+/// Layers of voxels in these layers of blocks of a level.
 Layers voxel_layers(const VolumeInfo &info, const Layers &blocks) {
   return {std::min(4 * blocks.begin, info.dims.z), std::min(4 * blocks.end, info.dims.z)};
 }
@@ -82,10 +82,10 @@ std::vector<Layers> share_out(std::uint32_t layers, std::uint32_t size) {
   return shares;
 }
 
-/// A block of the next level belongs to whom its first fine block belongs to, or the first behind
-/// that. Of it must be known, as the whole volume would give them: the blocks before and behind it,
-/// of which voxels are decoded, and layers of voxels of this level around those, of which they are
-/// made.
+/// Cuts all levels into slabs. A block of the next level belongs to the rank that has its first
+/// fine block, or else the first one behind that. The rank must also know, as the whole volume
+/// would give them, the blocks before and behind its own, and the layers of voxels of this level
+/// that these are made of.
 std::vector<LevelCuts> cut_levels(std::span<CompressedVolume *const> levels, std::uint32_t size) {
   constexpr std::uint32_t kAround = 4;
   std::vector<LevelCuts> cuts = {{share_out(block_layers(levels[0]->info), size), {}}};
@@ -165,7 +165,7 @@ struct LevelData {
   std::vector<float> decoded;  ///< of its own blocks
 };
 
-/// Of a list with so many values for each layer of blocks of `all`, those of `some`.
+/// The values of layers `some` from a list with per_layer values for each layer of `all`.
 template <class Value>
 std::span<Value> part_of(std::span<Value> values, std::size_t per_layer, const Layers &all,
                          const Layers &some) {
@@ -211,7 +211,7 @@ class TeamCompressor {
   const Layers &own() const { return cuts_[level_].own[team_.rank()]; }
   const Layers &worked() const { return cuts_[level_].worked[team_.rank()]; }
   bool is_first() const { return team_.rank() == 0; }
-  /// Of a layer of the level's blocks.
+  /// Number of blocks in a layer of the level.
   std::size_t blocks_of_layer(std::size_t level) const {
     const glm::uvec3 blocks = levels_[level]->num_blocks();
     return std::size_t{blocks.x} * blocks.y;
@@ -621,7 +621,7 @@ Section TeamCompressor::write_trailer(std::uint64_t begin, const Section &before
   });
 }
 
-/// Of the next level, the layers worked on that are other ranks' own.
+/// Fetches the layers of the next level that this rank works on and other ranks own.
 void TeamCompressor::fetch_neighbours() {
   const std::size_t next = level_ + 1;
   const LevelCuts &cuts = cuts_[next];
