@@ -103,7 +103,8 @@ struct ValueRange {
   std::array<float, 2> coded{};    ///< as float32, tiny ones before they become 0
   std::array<double, 2> source{};  ///< as the source has them
 };
-/// Reads the volume from front to back for `coder`. Of a part, all processes make the same call.
+/// Reads the volume from front to back for `coder`. If the reader has a part of a volume, all
+/// processes make the same call.
 ///
 /// Throws  Error: voxels that cannot be compressed, after all of them were looked at; a bad grid;
 ///         an unfit map_nan or no_data

@@ -93,7 +93,7 @@ class TeamCompressor {
   const LayerRange &own() const { return cuts_[level_].own[team_.rank()]; }
   const LayerRange &worked() const { return cuts_[level_].worked[team_.rank()]; }
   bool is_first() const { return team_.rank() == 0; }
-  /// Of a layer of the level's blocks.
+  /// Number of blocks in a layer of the level.
   std::size_t blocks_of_layer(std::size_t level) const {
     const glm::uvec3 blocks = levels_[level]->num_blocks();
     return std::size_t{blocks.x} * blocks.y;
@@ -461,7 +461,7 @@ FileSection TeamCompressor::write_trailer(std::uint64_t begin, const FileSection
   });
 }
 
-/// Of the next level, the layers worked on that are other ranks' own.
+/// Fetches the layers of the next level that this rank works on and other ranks own.
 void TeamCompressor::fetch_neighbours() {
   const std::size_t next = level_ + 1;
   const LevelCuts &cuts = cuts_[next];

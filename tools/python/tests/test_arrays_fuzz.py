@@ -14,7 +14,7 @@ import pytest
 from array_fuzzer import SIZES, Fake, fake, run_fuzz, some_real
 
 
-# Of what packages say while the inputs are made: casts that overflow, masked elements.
+# Warnings of packages while the inputs are made: casts that overflow, masked elements.
 pytestmark = pytest.mark.filterwarnings("ignore")
 
 
