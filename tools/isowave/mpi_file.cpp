@@ -16,6 +16,7 @@
 #include "core/base/error.hpp"
 #include "core/io/atomic_file.hpp"
 #include "core/platform/new_file.hpp"
+#include "core/platform/shared_memory.hpp"
 #include "core/platform/signals.hpp"
 #include "core/platform/streams.hpp"
 
@@ -103,12 +104,33 @@ class MpiFile : public SharedFile {
     if (result == MPI_SUCCESS) return;
     if (errno != 0) fail(std::strerror(errno));
     std::array<char, MPI_MAX_ERROR_STRING + 1> text{};
-
-  }  // namespace
-
-  std::unique_ptr<SharedFile> create_mpi_file(Team &team, const std::filesystem::path &target) {
-    return std::make_unique<MpiFile>(team, target);
+    int length = 0;
+    MPI_Error_string(result, text.data(), &length);
+    fail(text.data());
   }
+  std::string of_first(const std::string &text) { return team_.all_gather(text).front(); }
+  /// ISOWAVE_HOST_RANKS: as if there were several hosts.
+  bool is_seen_by_all(const std::string &name) {
+    const bool may_be = std::getenv("ISOWAVE_HOST_RANKS") == nullptr;
+    const std::vector<std::string> seen = team_.all_gather(may_be ? identity_of(name) : "");
+    return !seen.front().empty() && std::ranges::count(seen, seen.front()) == std::ssize(seen);
+  }
+  void close() {
+    if (file_ != MPI_FILE_NULL) MPI_File_close(&file_);
+    own_.reset();
+  }
+
+  Team &team_;
+  std::string target_;             ///< as asked for
+  std::optional<AtomicFile> own_;  ///< rank 0's
+  MPI_File file_ = MPI_FILE_NULL;
+};
+
+}  // namespace
+
+std::unique_ptr<SharedFile> create_mpi_file(Team &team, const std::filesystem::path &target) {
+  return std::make_unique<MpiFile>(team, target);
+}
 
 }  // namespace isowave::core::tools
 

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <cerrno>
 #include <chrono>
 #include <climits>
 #include <cstdio>
@@ -21,7 +20,6 @@
 
 #include "core/base/error.hpp"
 #include "core/base/parallel_for.hpp"
-#include "core/platform/new_file.hpp"
 #include "core/platform/shared_memory.hpp"
 #include "core/platform/signals.hpp"
 #include "core/platform/streams.hpp"
@@ -393,29 +391,6 @@ class MpiTeam : public Team {
 };
 
 std::unique_ptr<MpiTeam> team_of_job;
-int length = 0;
-MPI_Error_string(result, text.data(), &length);
-fail(text.data());
-}
-std::string of_first(const std::string &text) {
-  return team_.all_gather(text).front();
-}
-/// ISOWAVE_HOST_RANKS: as if there were several hosts.
-bool is_seen_by_all(const std::string &name) {
-  const bool may_be = std::getenv("ISOWAVE_HOST_RANKS") == nullptr;
-  const std::vector<std::string> seen = team_.all_gather(may_be ? identity_of(name) : "");
-  return !seen.front().empty() && std::ranges::count(seen, seen.front()) == std::ssize(seen);
-}
-void close() {
-  if (file_ != MPI_FILE_NULL) MPI_File_close(&file_);
-  own_.reset();
-}
-
-Team &team_;
-std::string target_;             ///< as asked for
-std::optional<AtomicFile> own_;  ///< rank 0's
-MPI_File file_ = MPI_FILE_NULL;
-};
 
 std::string checksum;  ///< of the command line
 
