@@ -30,6 +30,7 @@ struct Abilities {
   bool surface_error = false;      ///< FrameRequest::max_surface_error
   bool time_budget = false;        ///< FrameRequest::time_budget_ms
   bool kept_picture = false;       ///< keep_picture() and what goes with it
+  bool parallel = true;            ///< Camera::parallel_height
   Solver solver = kDefaultSolver;  ///< finds the hits
 };
 
