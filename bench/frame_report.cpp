@@ -35,7 +35,7 @@ double sum_of(const FrameStats &frame, uint PassCounts::*count) {
   return sum;
 }
 
-/// Of the passes in which rays looked ahead.
+/// Median N_Spec of the passes in which rays looked ahead.
 double median_n_spec(const FrameStats &frame) {
   std::vector<double> counts;
   for (const PassStats &pass : frame.passes) {

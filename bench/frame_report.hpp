@@ -33,7 +33,7 @@ struct FrameReport {
   std::uint64_t peak_bytes = 0;  ///< device memory
   nlohmann::ordered_json memory;
 
-  /// Of its frames, but for the camera.
+  /// The request of all frames, without the camera.
   FrameRequest request() const {
     return {.isovalue = isovalue,
             .voxel_pixels = voxel_pixels,

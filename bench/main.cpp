@@ -1,8 +1,7 @@
 // isowave_bench: every stage of the pipeline alone, on one device. The options that are not ours
 // are Google Benchmark's: --benchmark_filter=REGEX picks stages, --benchmark_out=FILE writes JSON.
-// A default run is for looking around: for numbers to quote or to compare (tools/compare-bench),
-// add --benchmark_min_time=1 or
-// --benchmark_repetitions=9.
+// A default run is for looking around. For numbers to quote or to compare (tools/compare-bench),
+// add --benchmark_min_time=1 or --benchmark_repetitions=9.
 
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>

@@ -252,8 +252,8 @@ class MeshSide : public PeerSide {
                           : trace_packets<Packet8>(tree.scene(), camera, size_);
   }
 
-  /// Which packets are faster here, the best of three traces each. Of the first mesh, which is not
-  /// measured.
+  /// Chooses the packets that are faster here, by the best of three traces of the first mesh, which
+  /// is not measured.
   void choose_packets(const MeshTree &tree) {
     std::array<double, 2> best;
     best.fill(std::numeric_limits<double>::infinity());

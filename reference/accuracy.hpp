@@ -33,8 +33,7 @@ struct Accuracy {
       0;  ///< the same hit in two cells, so near their common face that both are right
   std::uint64_t wrong_places =
       0;  ///< hits beside their ray, or whose float32 t is not that of their place
-  std::uint64_t unstable =
-      0;  ///< disagreements with nobody to blame: see judge() and mesh_oracle.hpp
+  std::uint64_t unstable = 0;    ///< disagreements without a fault: see judge() and mesh_oracle.hpp
   std::vector<double> distance;  ///< |t - t_oracle| of hits in both, along the ray [voxels]
   std::vector<double> residual;  ///< |field - isovalue| / |gradient| at the renderer's hit
                                  ///< [voxels]; none where the gradient is 0

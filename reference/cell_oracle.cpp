@@ -69,8 +69,8 @@ Vec local_position(const OracleRay &ray, const Cell &cell, const Segment &segmen
   return p;
 }
 
-/// The trilinear field: convex combinations along x, y, z. Of corners of one sign it has that sign,
-/// and at p = 0 or 1 it does not depend on the other side's corners.
+/// The trilinear field: convex combinations along x, y, z. If all corners have one sign, the field
+/// has that sign. At p = 0 or 1 it does not depend on the other side's corners.
 double trilinear(Corners v, const Vec &p) {
   unsigned count = 4;
   for (std::size_t axis = 0; axis < 3; ++axis, count /= 2) {
@@ -180,7 +180,7 @@ struct CellQuery : RTCIntersectContext {
     if (!segment || (query.best.hit && segment->t_enter > query.best.t)) return;
     const auto t =
         first_other_side(oracle.corners(cell), *query.ray, cell, *segment, query.start_inside);
-    // Of cells with the same t the lowest answers, whatever Embree's order.
+    // If cells have the same t, the lowest cell answers, in any order of Embree's.
     if (!t ||
         (query.best.hit && (*t > query.best.t || (*t == query.best.t && cell > query.best.cell))))
       return;

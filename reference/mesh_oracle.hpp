@@ -17,11 +17,10 @@
 //     the first of the two hits is sampled four times as finely, which leaves the trilinear
 //     surface what it is and brings the triangles nearer to it. In that box the rule is asked
 //     again, with a tolerance of sqrt(3) voxels at first and a quarter of it each further time, to
-//     1/256 voxel. Of the finest triangles it is enough that a ray moved sideways by up to 1/256
-//     voxel in one of eight directions gives the renderer's answer. Where finer triangles agree
-//     with the renderer, the pixel is counted as unstable, and the ray goes on behind that box;
-//   - the rest are failures: missed where the mesh's hit comes first, false where the renderer's
-//     does.
+//     1/256 voxel. For the finest triangles it is enough that a ray moved sideways by up to 1/256
+//     voxel in one of eight directions gives the renderer's answer. If finer triangles agree with
+//     the renderer, the pixel is counted as unstable, and the ray goes on behind that box;
+//   - the rest are failures: missed if the mesh's hit comes first, false if the renderer's does.
 // So it finds holes, leaks and surfaces in wrong places, of single pixels too, but knows the right
 // place only to a cell's diagonal; the other oracles judge what is within.
 

@@ -73,7 +73,8 @@ class ArithmeticOnDevice : public testing::TestWithParam<DeviceInfo> {};
 TEST_P(ArithmeticOnDevice, SmallComputesAsTheHost) {
   Device device(GetParam());
   const std::vector<Operands> operands = arithmetic_operands();
-  const std::vector<std::string> kinds = differences(operands, compute_on(device, operands));
+  const std::vector<std::string> kinds =
+      differences(operands, compute_on(device, operands).results);
   EXPECT_EQ(kinds.empty(), device.notice().empty());
   if (device.capabilities().denormals && device.capabilities().correctly_rounded_divide) {
     EXPECT_THAT(kinds, IsEmpty());

@@ -158,7 +158,7 @@ TEST_P(BricksOnDevice, OneBlockEachInTightCaches) {
 }
 
 /// Ranges of values are stored through the whole's thresholds, so that bricks find the blocks that
-/// the whole finds, and with them the view that it takes where nobody asks for one.
+/// the whole finds. So bricks have its default view, too.
 TEST_P(BricksOnDevice, SameActiveBlocks) {
   const TestVolume volume({21, 18, 17}, test::sphere_field({21, 18, 17}));
   const RendererOptions options = GetParam().with({.size = {9, 7}});
@@ -402,7 +402,7 @@ TEST(Bricks, KeepTheWholesVoxels) {
   }
 }
 
-/// Of each of a brick's blocks, its bound in the whole; and what is known of all voxels.
+/// Each of a brick's blocks has its bound in the whole, and the brick what is known of all voxels.
 TEST(Bricks, KeepTheWholesBounds) {
   const VolumeInfo info = test::grid_info({41, 37, 33});
   ArrayReader reader(info, test::sample(info.dims, test::noise_field(6)));

@@ -301,8 +301,8 @@ TEST(CliOptions, KernelsThatDoNotBuildAreOneLineAndALog) {
   EXPECT_TRUE(failed) << "else this proves nothing";
 }
 
-/// As an ordinary user: root may write where nobody else may. To compress takes the kernels that
-/// compile the fastest.
+/// As an ordinary user, since root may write everywhere. Compressing needs the kernels that compile
+/// the fastest.
 TEST(CliOptions, PoclGetsACacheFolderThatWorks) {
   const TemporaryFolder folder, temporary;
   if (run_isowave("devices").out.find("Portable Computing Language") == std::string::npos)

@@ -280,7 +280,7 @@ TEST_F(CliOutputs, WhatCannotBeWrittenIsSaidBeforeAnyWork) {
   expect_one_line_error("bench pareto " + inputs + "--json " + name("pipe"), "not a regular file");
   expect_one_line_error("bench solvers none.raw:1 --json " + name("pipe"), "not a regular file");
   expect_one_line_error("convert none_8x8x8_uint8.raw -o " + name("missing/a.zfp"), "cannot write");
-  // Within a limit: whoever does not look first must not fill the disk.
+  // Within a limit, so that a program which does not look first cannot fill the disk.
   const auto too_large = test::run_command("ulimit -f 64; " + test::isowave_program() +
                                            " generate sphere --dims 65536 -o " + name("a.raw"));
   EXPECT_EQ(too_large.status, 1);

@@ -31,7 +31,7 @@ using test::run_command;
 using test::run_isowave;
 using test::TemporaryFolder;
 
-/// Several processes on one CPU, whoever runs the tests. Oversubscribed and not bound to cores.
+/// Several processes on one CPU, by any user, root too; oversubscribed and not bound to cores.
 /// -q: mpirun itself says nothing.
 const std::string kMpirun =
     ISOWAVE_MPIRUN " -q --oversubscribe --bind-to none --allow-run-as-root ";
@@ -80,7 +80,7 @@ class CliRanks : public testing::Test {
                 count, bricks);
   }
 
-  /// Of --stats, but for what differs from run to run, and from brick to brick.
+  /// Errors in --stats, without what differs from run to run, and from brick to brick.
   static std::string errors_in(const std::string &stats) {
     nlohmann::json errors;
     for (const auto &frame : nlohmann::json::parse(stats)["frames"]) {
@@ -345,7 +345,7 @@ TEST_F(CliRanks, RefusedVoxelsAreCountedOnce) {
   EXPECT_EQ(folder_.num_files(), 1u);
 }
 
-/// Of 64 ranks each gives half a word for each ray of a picture, whatever it has drawn.
+/// Each of 64 ranks gives half a word for each ray of a picture, even if it has drawn nothing.
 TEST_F(CliRanks, ManyRanksGiveHalfAWordForEachRay) {
   skip_unless_long();
   if (IsSkipped()) return;
@@ -363,8 +363,8 @@ TEST_F(CliRanks, ManyRanksGiveHalfAWordForEachRay) {
   }
 }
 
-/// Of the folder that the environment names, such as one of Open SciVis sets; three isovalues among
-/// the middle 80 % of each volume's voxels.
+/// Volumes of the folder that the environment names, such as one of Open SciVis sets, at three
+/// isovalues among the middle 80 % of each volume's voxels.
 TEST_F(CliRanks, RealVolumes) {
   const char *folder = std::getenv("ISOWAVE_TEST_VOLUMES");
   if (folder == nullptr) GTEST_SKIP() << "ISOWAVE_TEST_VOLUMES names no folder of volumes";

@@ -109,7 +109,7 @@ TEST(CliVerify, TracesRaysAtClosedSurfacesByTwinAndDevice) {
 
 TEST(CliVerify, RefusesWhatItCannotDo) {
   test::expect_one_line_error("verify --oracle cells", "give a VOLUME");
-  EXPECT_NE(run_isowave("verify " + kHead + " --isovalue 100 --oracle nobody").status, 0);
+  EXPECT_NE(run_isowave("verify " + kHead + " --isovalue 100 --oracle none").status, 0);
 }
 
 }  // namespace

@@ -30,7 +30,7 @@ struct FirstChange {
   bool found = false;
   Real s = 0;
   Real margin =
-      0;  ///< smallest |f| at a cut: nearer to 0 than rounding, nobody can tell what happens there
+      0;  ///< smallest |f| at a cut: if it is below rounding, either side is possible there
 };
 
 inline FirstChange first_change_of(const Polynomial &f) {

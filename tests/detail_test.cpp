@@ -452,7 +452,7 @@ TEST_P(LevelsOnDevice, RefusesWhatItCannotDraw) {
 
 // ---- what it is for
 
-/// Not so of every volume (bench/README.md): where a pixel is covered in part, one ray is
+/// Not so of every volume (bench/h100.md): where a pixel is covered in part, one ray is
 /// as wrong at any level.
 TEST(LevelsOfDetail, SpecksSmallerThanAPixelSpoilThePictureLess) {
   const glm::uvec3 dims(128, 128, 128);

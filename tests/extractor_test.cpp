@@ -140,6 +140,8 @@ TEST_P(ExtractorOnDevice, ASphereIsClosedAndLooksOutwards) {
 /// Integers, of which many equal the isovalue: vertices meet on these voxels, unless they are kept
 /// apart.
 TEST_P(ExtractorOnDevice, SmallTiesLeaveNoTriangleWithoutArea) {
+  if (is_simulator(GetParam()))
+    GTEST_SKIP() << "takes half a minute there, by the kernels of SmallVolumeEqualsTheTwin";
   const glm::uvec3 dims(13, 14, 11);
   std::vector<float> voxels = random_voxels(dims, 0, 4, 7);
   for (float &voxel : voxels) voxel = std::floor(voxel);

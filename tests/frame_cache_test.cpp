@@ -1,6 +1,5 @@
-// The block cache over frames, as whoever moves a camera meets it: which views need no decoding
-// when they come again, in every pipeline. (tests/block_cache_test.cpp has the order of eviction,
-// slot by slot.)
+// The block cache over frames of a moving camera: which views need no decoding when they come
+// again, in every pipeline. (tests/block_cache_test.cpp has the order of eviction, slot by slot.)
 
 #include <gtest/gtest.h>
 

@@ -82,9 +82,9 @@ TEST(GridDda, PlaneCrossingsAscend) {
   }
 }
 
-/// u = 2^-24. Rounding of the result: u |x|. Of the corrections: t.lo d 2 u^2 |p|, + se 2 u^2 |p| +
-/// u^2 |s|,
-/// + re 3 u^2 |p| + 2 u^2 |s|, all below 8 u^2 (|p| + |s|), where s = o - c and p = t d cancel.
+/// u = 2^-24, s = o - c and p = t d, which cancel. Rounding of the result: u |x|. Rounding of the
+/// corrections: t.lo d 2 u^2 |p|; + se 2 u^2 |p| + u^2 |s|; + re 3 u^2 |p| + 2 u^2 |s|. Together
+/// they are below 8 u^2 (|p| + |s|).
 TEST(GridDda, LocalPositionsKeepTheirBitsFarFromTheEye) {
   RandomAxes random(3);
   int within = 0;

@@ -1,5 +1,4 @@
-// Blocks that rays on the host decode: which ones, once each, whoever comes first; in how much
-// memory.
+// Blocks that rays on the host decode: which ones, once each for all threads, in how much memory.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -106,8 +105,8 @@ TEST(HostBlocks, ActiveAreTheBlocksWithCellsThatChange) {
   }
 }
 
-/// Threads that all start at the same tile of a small volume, again and again. Whoever comes first
-/// decodes; every block once; everybody sees it whole.
+/// Threads that all start at the same tile of a small volume, again and again. The first thread
+/// that comes to a block decodes it, once; all threads see it whole.
 TEST(HostBlocks, ThreadsRaceForTheSameBlocks) {
   constexpr std::size_t kThreads = 8;
   constexpr int kTurns = 60;
@@ -193,7 +192,7 @@ TEST(HostBlocks, ThreadsThatMeetAtABlockSeeItWhole) {
             if (i % 1000 == 999) std::this_thread::yield();
           }
           field.open(block);
-          // Of the dual grid, the one that is likely to be new.
+          // The block of the dual grid that is likely to be new.
           const glm::uvec3 end = glm::min(at + 1u, size - 1u);
           const std::size_t last = end.x + size.x * (end.y + std::size_t{size.y} * end.z);
           num_wrong += field.changing[block] != expected.changing[block] ||
@@ -359,7 +358,7 @@ TEST(HostBlocks, AnErrorOfTheWorkEndsIt) {
               testing::ThrowsMessage<Error>("my own"));
 }
 
-/// Of parts of blocks, whole ones and those at the volume's end.
+/// Value ranges of parts of blocks, whole ones and those at the volume's end.
 TEST(HostLoops, RangesOfParts) {
   const glm::uvec3 dims(9, 10, 11);
   const TestVolume volume(dims, test::noise_field(8), 12);

@@ -337,7 +337,7 @@ TEST_P(MacrocellsOnDevice, NoisyPlateaus) {
 
 /// Masks of a volume and of its bounds are kept side by side: a renderer that draws them by turns
 /// finds them as they were.
-TEST_P(MacrocellsOnDevice, SmallSelectionsAreKept) {
+TEST_P(MacrocellsOnDevice, SelectionsAreKept) {
   const glm::uvec3 dims(24, 20, 18);
   const CompressedVolume volume = compress_with_libzfp(sphere_voxels(dims), dims, 2048);
   const DeviceStream stream(device_, volume);

@@ -98,6 +98,14 @@ TEST_P(OclKernelOnDevice, SmallGroupsOfDevicesThatGiveNoLargerOnes) {
   EXPECT_THAT(seen.read(), testing::ElementsAre(4u, 16u, 1u));
 }
 
+/// Also where the device promises larger groups than it gives any kernel.
+TEST_P(OclKernelOnDevice, SmallKernelsAreBuiltOnce) {
+  ocl::Kernel<kernels::group_sizes> sizes(device_, {{"ISO_GROUP_SIZE", "64u"}});
+  ocl::Buffer<uint> seen(device_, "seen", 3);
+  sizes(Range::groups(1, 64), seen);
+  EXPECT_EQ(device_.built_programs().size(), 1u);
+}
+
 TEST_P(OclKernelOnDevice, SmallLocalMemoryAndGroups) {
   constexpr std::size_t kGroupSize = 32, kNumGroups = 5;
   std::vector<uint> values(kGroupSize * kNumGroups);

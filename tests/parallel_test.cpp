@@ -101,32 +101,46 @@ TEST(ParallelProjection, OneLevelOfDetailDrawsAll) {
 
 class ParallelOnDevice : public testing::TestWithParam<PipelineOnDevice> {
  protected:
+  /// Device, host and twin draw the same frames, of at least so many hits each.
+  void expect_frames(const TestVolume &volume, const std::vector<Camera> &cameras, ImageSize size,
+                     std::size_t least_hits);
+
   ocl::Device device_{GetParam().device};
 };
 INSTANTIATE_TEST_SUITE_P(Devices, ParallelOnDevice, testing::ValuesIn(pipelines_under_test()),
                          pipeline_test_name);
 
-TEST_P(ParallelOnDevice, SmallFramesAreTheTwinsAndTheHosts) {
-  const TestVolume volume({18, 19, 21}, test::gyroid_field(9));
+void ParallelOnDevice::expect_frames(const TestVolume &volume, const std::vector<Camera> &cameras,
+                                     ImageSize size, std::size_t least_hits) {
   DeviceRenderer device(device_, volume.compressed,
-                        GetParam().with({.size = kSize, .with_given_rays = true}));
-  TwinRenderer twin(volume.compressed, kSize);
+                        GetParam().with({.size = size, .with_given_rays = true}));
+  TwinRenderer twin(volume.compressed, size);
   HostRenderer host(volume.compressed);
-  for (const Camera &camera : parallel_cameras(volume.info())) {
-    FrameRequest request{.camera = camera, .isovalue = kIsovalue, .size = kSize};
+  for (const Camera &camera : cameras) {
+    FrameRequest request{.camera = camera, .isovalue = kIsovalue, .size = size};
     request.ambient_rays = 2;
     device.render(request);
     twin.render(request);
     host.render(request);
-    EXPECT_GT(test::num_hits(twin.hits()), 100u);
-    expect_same_hits(device.hits(), twin.hits(), kSize.width);
-    expect_same_hits(host.hits(), twin.hits(), kSize.width);
+    EXPECT_GT(test::num_hits(twin.hits()), least_hits);
+    expect_same_hits(device.hits(), twin.hits(), size.width);
+    expect_same_hits(host.hits(), twin.hits(), size.width);
     EXPECT_EQ(device.shade().pixels, twin.shade().pixels);
     EXPECT_EQ(host.shade().pixels, twin.shade().pixels);
   }
 }
 
-TEST_P(ParallelOnDevice, SmallFramesOfCoarserLevels) {
+TEST_P(ParallelOnDevice, FramesAreTheTwinsAndTheHosts) {
+  const TestVolume volume({18, 19, 21}, test::gyroid_field(9));
+  expect_frames(volume, parallel_cameras(volume.info()), kSize, 100);
+}
+
+TEST_P(ParallelOnDevice, SmallFrame) {
+  const TestVolume volume({9, 10, 11}, test::gyroid_field(7));
+  expect_frames(volume, {in_parallel(orbit_cameras(volume.info(), 1)[0])}, {8, 6}, 10);
+}
+
+TEST_P(ParallelOnDevice, FramesOfCoarserLevels) {
   const glm::uvec3 dims(40, 36, 44);
   ArrayReader reader(test::grid_info(dims), test::sample(dims, test::sphere_field(dims)));
   const CompressedVolume volume = compress(reader, CompressOptions{.rate = 8, .levels = 0});

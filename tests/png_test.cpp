@@ -132,7 +132,7 @@ TEST_F(PngTest, RefusesTruncatedAndBrokenFiles) {
   EXPECT_THAT(refusal(flipped), HasSubstr("broken PNG"));
 }
 
-/// Of `isowave compare` of a file with itself [MiB].
+/// Peak memory of `isowave compare` of a file with itself [MiB].
 long peak_of_compare(const std::filesystem::path &path) {
   return test::peak_of_isowave({"compare", path.string(), path.string()});
 }
@@ -156,7 +156,7 @@ TEST_F(PngTest, TakesNoMoreMemoryThanItsPixelsNeed) {
 }
 
 TEST_F(PngTest, ReadsInterlacedPictures) {
-  // Of 2 x 2 pixels, Adam7's passes 1, 6 and 7 hold (0,0), (1,0) and the row below.
+  // Adam7's passes 1, 6 and 7 of 2 x 2 pixels hold (0,0), (1,0) and the row below.
   std::string file = png(2, 2, 8, 2, "", std::string("\0abc\0def\0ghijkl", 15));
   constexpr std::size_t kHeaderAt = 8, kHeaderBytes = 25, kDataAt = 16, kDataBeforeInterlace = 12;
   file.replace(kHeaderAt, kHeaderBytes,

@@ -47,11 +47,11 @@ TEST(PrivateFolder, OwnFoldersAndMissingOnes) {
   }
   EXPECT_EQ(danger_of(own / "a" / "b"), "");
   EXPECT_EQ(check_private(own / "a" / "b").path, own / "a" / "b");
-  EXPECT_FALSE(fs::exists(own / "a")) << "nobody else can make it";
+  EXPECT_FALSE(fs::exists(own / "a")) << "others cannot make it";
   EXPECT_THAT(danger_of(own / "a" / ".." / ".." / "b"), HasSubstr("is missing"));
   write_file(own / "file", std::string_view(""));
   fs::create_symlink("circle", own / "circle");
-  EXPECT_EQ(danger_of(own / "file" / "a"), "") << "nobody can write there";
+  EXPECT_EQ(danger_of(own / "file" / "a"), "") << "no user can write there";
   EXPECT_EQ(danger_of(own / "circle"), "");
 }
 

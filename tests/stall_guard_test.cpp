@@ -20,7 +20,7 @@ TEST(StallGuard, ThrowsAfterAsManyPassesAsARayHasCells) {
   StallGuard guard(kDims);
   for (int pass = 0; pass < 12; ++pass) guard.check(waiting(7));
   EXPECT_THAT([&] { guard.check(waiting(7)); },
-              testing::ThrowsMessage<Error>(testing::HasSubstr("7 rays wait for blocks")));
+              testing::ThrowsMessage<Error>(testing::HasSubstr("7 rays have waited for")));
 }
 
 TEST(StallGuard, AnyProgressStartsAnew) {

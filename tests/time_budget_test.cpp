@@ -126,7 +126,7 @@ TEST_P(TimeBudgetOnDevice, HardlyAnyTimeGivesTheFewestRays) {
   expect_same_hits(shown, enlarged(small, {4, 3}, kSize), kSize.width);
 }
 
-/// Whoever asks may stop it at any pass, be it of the smallest picture, and see what there is.
+/// on_pass may stop a frame at any pass, even of the smallest picture; what is there is shown.
 TEST_P(TimeBudgetOnDevice, CanBeStoppedAtAnyPass) {
   FrameRequest request{camera_, kIsovalue};
   std::vector<ImageSize> sizes;

@@ -176,7 +176,7 @@ TEST_F(NrrdFile, LengthsInOtherUnitsBecomeMillimetres) {
   EXPECT_EQ(by_axes->info().origin, glm::dvec3(0.011, 18, 0));
 }
 
-/// Of an axis that is not in space.
+/// The direction of an axis that is not in space.
 TEST_F(NrrdFile, DirectionsThatAreNanAreNone) {
   const auto header = [](const std::string &directions) {
     return "NRRD0004\ntype: uint8\ndimension: 4\nsizes: 1 3 4 5\nspace: LPS\nspace directions: " +

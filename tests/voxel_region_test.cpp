@@ -156,7 +156,7 @@ void overwrite(const std::filesystem::path &path, const std::string &bytes) {
       .write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
 }
 
-/// Other blocks are gone from the file, and nobody minds.
+/// Regions are read from a file whose other blocks are gone.
 TEST_P(VoxelRegion, NeedsItsOwnBlocksAlone) {
   volume_->save(folder_ / "volume.zfp");
   const auto opened = open_volume(folder_ / "volume.zfp");

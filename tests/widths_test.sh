@@ -17,7 +17,7 @@ printf '%0101d\n' 0 > "$wide"
 printf '%0100d\n' 0 > "$wide"
 [ -z "$(too_wide "$wide")" ] || { echo 'widths_test: a line of 100 columns is found'; exit 1; }
 
-# Data, what programs made, and tables that clang-format is told to leave are nobody's lines.
+# Data, what programs made, and tables that clang-format is told to leave are left out.
 mapfile -t files < <(
   find . -maxdepth 1 -type f ! -name LICENSE
   find .ci bench core kernels_cl reference tests tools -type f \

@@ -20,9 +20,9 @@
 namespace isowave::core {
 
 struct Certificate {
-  /// Of each ray: the distance between the drawn and the true hit along it, at most [pixels: what a
-  /// pixel covers at the drawn hit's distance]; 0 where both miss for certain; infinity where
-  /// nothing is certain.
+  /// [ray] Largest possible distance between the drawn and the true hit along the ray [pixels: what
+  /// a pixel covers at the drawn hit's distance]; 0 if both miss for certain; infinity if nothing
+  /// is certain.
   std::vector<float> bounds;
   double total_ms = 0;  ///< wall clock, of both bounds' frames and what the host makes of them
   std::uint64_t decoded_blocks = 0;  ///< for them, by all ranks
@@ -52,7 +52,11 @@ struct CertificateSummary {
   double median = 0, p99 = 0,
          max = 0;  ///< bounds of those that have one; 0 if there are none [pixels]
 };
-/// limit: pixels.
-CertificateSummary summarize(const Certificate &certificate, double limit);
+/// bounds  Certificate::bounds
+/// limit   [pixels]
+CertificateSummary summarize(std::span<const float> bounds, double limit);
+inline CertificateSummary summarize(const Certificate &certificate, double limit) {
+  return summarize(certificate.bounds, limit);
+}
 
 }  // namespace isowave::core

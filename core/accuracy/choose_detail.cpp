@@ -13,7 +13,7 @@ namespace isowave::core {
 
 namespace {
 
-/// Of the small picture: a pixel for so many of the frame along each axis, but no fewer rows.
+/// Stride of the small picture's pixels in the frame, along each axis, and its fewest rows.
 constexpr std::uint32_t kMaxStride = 8, kMinRows = 64;
 /// Distances between voxels that may be chosen: 8 pixels, and so many times an eighth of an octave
 /// less.

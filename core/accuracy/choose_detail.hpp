@@ -12,7 +12,7 @@ inline constexpr double kLostShare = 0.01;
 /// Coarser levels are taken where they leave at most so much of the finest level's blocks: a frame
 /// of several levels costs more beside that. A judgement: on the H100, frames with 0.5, 0.64, 0.71
 /// of the blocks took 0.89, 0.81, 0.87 of the time, others with 0.58 and 0.63 took 1.19 and 1.04
-/// (bench/README.md).
+/// (bench/h100.md).
 inline constexpr double kMaxBlocksShare = 2.0 / 3;
 
 /// Bit planes are left out only of volumes with more bits a voxel. The others' frames would take

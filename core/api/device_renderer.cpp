@@ -25,9 +25,9 @@ core::RendererOptions core_options(const RendererOptions &options, std::uint32_t
   return result;
 }
 
-std::unique_ptr<core::Renderer> with_choices(std::unique_ptr<core::Renderer> renderer,
-                                             const RendererOptions &options,
-                                             const core::CompressedVolume &volume, double rate) {
+std::unique_ptr<core::Renderer> add_choices(std::unique_ptr<core::Renderer> renderer,
+                                            const RendererOptions &options,
+                                            const core::CompressedVolume &volume, double rate) {
   if (options.with_bounds)
     renderer = std::make_unique<core::BoundedRenderer>(std::move(renderer), volume, rate);
   if (options.with_time_budget)
@@ -50,9 +50,9 @@ std::unique_ptr<core::Renderer> make_on_device(Device &device, const Volume &vol
   const core::CompressedVolume &compressed = volume.implementation().volume;
   const std::lock_guard lock(on.mutex);
   const KernelWatch watch(on.device, before_kernel);
-  return with_choices(std::make_unique<core::DeviceRenderer>(
-                          on.device, compressed, core_options(options, volume.num_levels())),
-                      options, compressed, compressed.rate());
+  return add_choices(std::make_unique<core::DeviceRenderer>(
+                         on.device, compressed, core_options(options, volume.num_levels())),
+                     options, compressed, compressed.rate());
 }
 
 void check_there(const std::shared_ptr<Device> &device,

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/accuracy/certify.hpp"
 #include "core/api/turns.hpp"
 #include "core/frame/soon_renderer.hpp"
 #include "core/zfp/zfp_stream.hpp"
@@ -16,10 +17,16 @@
 
 namespace isowave {
 
+/// What the program reports of a frame, beside what Frame says.
+struct LastFrame {
+  core::FrameStats stats{};
+  core::Certificate certificate{};  ///< with FrameRequest::want_bounds; its bounds are Frame's
+};
+
 struct Renderer::Implementation {
  public:
   /// turns   of calls: those of the device, if other renderers use it
-  /// of      the volume that this process draws; lives as long as turns
+  /// of      the volume that this process draws, which must outlive this
   Implementation(std::shared_ptr<Turns> turns, const core::CompressedVolume &of,
                  std::unique_ptr<core::Renderer> renderer);
   /// The same of a volume that the user has opened.
@@ -42,6 +49,8 @@ struct Renderer::Implementation {
   std::string isovalue_notice(double isovalue) const;
   std::uint64_t memory_bytes() const { return soon ? soon->memory_bytes() : memory_bytes_.load(); }
   double setup_ms() const { return renderer_->setup_ms(); }
+  core::Renderer &core() { return *renderer_; }
+  const LastFrame &last() const { return last_; }
 
   std::shared_ptr<Device> device{};
   std::shared_ptr<const Volume> volume{};
@@ -59,6 +68,7 @@ struct Renderer::Implementation {
   std::shared_ptr<Turns> turns_;
   const core::CompressedVolume &volume_;
   std::unique_ptr<core::Renderer> renderer_;
+  LastFrame last_;
   std::atomic<std::uint64_t> memory_bytes_ = 0;
 };
 

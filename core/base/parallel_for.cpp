@@ -30,7 +30,7 @@ void parallel_for(std::uint64_t num_items, std::uint32_t num_threads,
   const std::uint32_t threads = std::min(thread_count(num_threads), thread_count(0));
 #ifdef ISOWAVE_HAS_TBB
   begin_threads();
-  // An arena of its own, so that a thread's number is below the count whoever calls.
+  // A new arena, so that a thread's number is below the count even if a task of oneTBB calls.
   tbb::task_arena arena(static_cast<int>(threads));
   arena.execute([&] {
     tbb::parallel_for(tbb::blocked_range<std::uint64_t>(0, num_items), [&](const auto &range) {

@@ -71,9 +71,9 @@ CompressedVolume load_brick(const std::string &path, const RawOverrides &overrid
                             const Storage &storage, const VolumeInfo &info, std::size_t num_levels,
                             const BlockBox &own);
 
-/// What the whole volume's thresholds of value ranges are made of (range_thresholds()), as far as
-/// it is in the brick's own blocks: together, the bricks give what the whole would. Of volumes of
-/// more blocks than have ids, a sample of each brick's own.
+/// The brick's part of the values that thresholds of value ranges are made of (range_thresholds()).
+/// Together, the bricks give what the whole volume would. If the whole has more blocks than there
+/// are ids, each brick gives a sample of its own.
 std::vector<float> range_samples(const CompressedVolume &brick, const VolumeInfo &whole);
 
 }  // namespace isowave::core

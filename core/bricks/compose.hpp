@@ -4,8 +4,8 @@
 //
 // What is put together is a word of 64 bits for each ray: above, the place of the brick in that
 // order, below, 32 bits of what its ray has hit. So the smallest word wins, which is what
-// MPI_MIN finds. Of colours, where there are few bricks, it is a half of a word: 8 bits for the
-// place, and 24 for the colour.
+// MPI_MIN finds. If there are few bricks, a colour takes half a word: 8 bits for the place, 24 for
+// the colour.
 
 #include <cstdint>
 #include <span>

@@ -46,14 +46,12 @@ class TeamRenderer : public Renderer {
 
   /// Draws this rank's brick. Ambient rays go through those of all ranks.
   ///
-  /// request  its on_pass, which all ranks have or none, is called at all of them after each pass
-  ///          that any has, be this rank through or not: it may ask for the picture so far, and
-  ///          must return the same at all
-  /// Returns  what that took; cancelled: if any rank is not through
-  /// Throws   Error at every rank: as DeviceRenderer::render(), and what on_pass throws, at one;
-  /// one
-  ///          renderer of the whole would draw with levels of detail that bricks do not have, and
-  ///          this one with finer ones
+  /// request  All ranks have an on_pass, or none. It is called at all ranks after each pass of any
+  ///          rank, may ask for the picture so far, and must return the same at all ranks.
+  /// Returns  what the frame took; cancelled if any rank is unfinished
+  /// Throws   Error at every rank, if one rank fails as DeviceRenderer::render() does, or its
+  ///          on_pass throws; or if the whole would be drawn with coarser levels of detail than the
+  ///          bricks have
   FrameStats render(const FrameRequest &request) override;
   /// Throws  Error: rays go on in other bricks
   std::vector<HitRecord> cast_rays(std::span<const WorldRay> rays, float isovalue,

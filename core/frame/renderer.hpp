@@ -47,7 +47,8 @@ inline ImageSize size_of(const FrameRequest &request, const Abilities &abilities
   return request.size.value_or(abilities.largest);
 }
 
-/// Not thread-safe. Of a team's renderers, all make the same calls in the same order.
+/// Turns requests into pictures. Not thread-safe. All processes of a team make the same calls in
+/// the same order.
 class Renderer {
  public:
   virtual ~Renderer() = default;
@@ -62,9 +63,8 @@ class Renderer {
 
   /// Draws one frame, and waits for it.
   ///
-  /// Throws  Error: what check() refuses; a degenerate camera; a NaN isovalue. The next frame is
-  /// not
-  ///         affected
+  /// Throws  Error: what check() refuses; a degenerate camera; a NaN isovalue. The renderer can
+  ///         draw further frames afterwards
   virtual FrameStats render(const FrameRequest &request) = 0;
 
   /// The first hit of each ray, in the finest level of detail. t counts in lengths of the ray's

@@ -25,7 +25,7 @@ struct Eight {
 
   Eight() = default;
   Eight(Four a, Four b) : low(a), high(b) {}
-  // Of one number for all lanes, as vectors do in arithmetic.
+  // The same number in all lanes, as vectors take it in arithmetic.
   Eight(Lane x) : low{x, x, x, x}, high{x, x, x, x} {}
   Eight(Lane a, Lane b, Lane c, Lane d, Lane e, Lane f, Lane g, Lane h)
       : low{a, b, c, d}, high{e, f, g, h} {}
@@ -127,10 +127,10 @@ inline Ints larger(Ints a, Ints b) {
   return pick(a > b, a, b);
 }
 
-/// Of the two lower lanes, in those. The product is exact in float64. The sum is rounded to odd:
-/// where it is not exact, and its last bit 0, it becomes the neighbour on the other side of what is
-/// exact, whose last bit is 1. So rounding it to float32, which has less than half as many bits,
-/// has the result of rounding once (Boldo and Melquiond, Emulation of FMA, 2008).
+/// Fused multiply-add of the two lower lanes. The product is exact in float64. The sum is rounded
+/// to odd: if the sum is inexact and its last bit is 0, it becomes the neighbour on the other side
+/// of the exact sum, whose last bit is 1. So rounding the sum to float32, which has less than half
+/// as many bits, has the result of rounding once (Boldo and Melquiond, Emulation of FMA, 2008).
 inline Half fma_of_two(Half a, Half b, Half c) {
   const __m128d product = _mm_mul_pd(_mm_cvtps_pd(a), _mm_cvtps_pd(b)), addend = _mm_cvtps_pd(c);
   const __m128d sum = _mm_add_pd(product, addend), back = _mm_sub_pd(sum, product);

@@ -133,8 +133,10 @@ void HostBlocks::find_ranges() {
   thresholds_ = range_thresholds(std::move(sampled));
 }
 
-/// Of the parts of all blocks of a layer, into ranges [block][8]. sampled: gets the ranges of those
-/// blocks that thresholds are made of.
+/// Writes the value ranges of the eight parts of each block of layer z.
+///
+/// ranges   [block][8]
+/// sampled  gets the ranges of the blocks that thresholds are made of
 void HostBlocks::ranges_of_layer(std::uint32_t z, std::span<BlockRange> ranges,
                                  std::span<float> sampled) const {
   const std::uint64_t num_blocks = std::uint64_t{blocks_.x} * blocks_.y, layer = z * num_blocks;
@@ -171,7 +173,7 @@ void HostBlocks::ranges_of_layer(std::uint32_t z, std::span<BlockRange> ranges,
       });
 }
 
-/// Of the blocks of layer z, from ranges_of_layer() of it and of the one above.
+/// Sets the ranges of dual grids of layer z, from ranges_of_layer() of z and of z + 1.
 void HostBlocks::set_dual_ranges(std::uint32_t z, std::span<const BlockRange> layer,
                                  std::span<const BlockRange> above) {
   const glm::uvec3 dims = volume_->info.dims;
@@ -276,11 +278,12 @@ std::optional<BlockBox> HostBlocks::rounded_box(float isovalue) const {
 
 // ---- Blocks, when rays come to them
 //
-// A block's values are written by the thread that sets decoded_ from kNone to kBeingMade, and by no
-// other; it releases kDecoded after that. Who acquires kDecoded there may read them. opened_ and
-// changing() are the same. That thread has acquired kDecoded of the eight blocks of the dual grid
-// before it releases opened_; so who acquires opened_ may read the values of all eight, whoever
-// wrote them. Between two calls of run() nobody else is at work: parallel_for() has joined.
+// A block's values are written only by the thread that sets decoded_ from kNone to kBeingMade; the
+// thread releases kDecoded afterwards. A thread that acquires kDecoded may read the values. opened_
+// guards changing() in the same way. A thread acquires kDecoded of the eight blocks of the dual
+// grid before it releases opened_. So a thread that acquires opened_ may read the values of all
+// eight, even if other threads wrote them. Between two calls of run(), no other thread is at work:
+// parallel_for() has joined.
 
 HostField HostBlocks::field() {
   return {values(), changing(), masks_.data(), decoded_.data(), opened_.data(), selection_, this};
@@ -386,7 +389,7 @@ void HostBlocks::decode_to(std::size_t block, float *values) const {
   host_loops().decode(bits, values);
 }
 
-/// Of the values of its decoded dual grid.
+/// Finds the cells of the block that change, from the values of its decoded dual grid.
 void HostBlocks::find_changing(std::size_t block, std::span<const std::size_t, 8> dual_grid) {
   std::atomic<uchar> &state = opened_[block];
   uchar seen = state.load(std::memory_order_acquire);

@@ -48,8 +48,7 @@ class BlockMaker {
 /// (HostBlocks::run): for these, until the next call of open() or of the maker.
 struct HostField {
   const float *values;    ///< [block][64] x + 4y + 16z; of decoded blocks
-  const ulong *changing;  ///< [block] bit x + 4y + 16z: do the corners of the cell differ? Of open
-                          ///< blocks
+  const ulong *changing;  ///< [open block] bit x + 4y + 16z: do the corners of the cell differ?
   const ulong *masks;     ///< [macrocell] bit x + 4y + 16z: has the block a cell that does?
   const std::atomic<uchar> *decoded;  ///< [block] kDecoded: its values are there
   const std::atomic<uchar> *opened;   ///< [block] selection: it is open

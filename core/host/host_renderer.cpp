@@ -20,7 +20,7 @@ namespace {
 
 /// Rays along a tile's edge, about: neighbours walk through the same blocks.
 constexpr std::uint32_t kTileRays = 16;
-/// Of a band, for each thread, so that none waits long for the last.
+/// Tiles of a band for each thread: enough that no thread waits long for the last.
 constexpr std::uint32_t kTilesPerThread = 8;
 /// Rays of any origin that a thread takes at a time.
 constexpr std::uint32_t kRunRays = 1024;

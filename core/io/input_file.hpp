@@ -12,8 +12,8 @@
 
 namespace isowave::core {
 
-/// A regular file, open for reading. Anything else is refused: reading a pipe would wait for
-/// whoever writes to it, and a device may never end.
+/// A regular file, open for reading. Pipes and devices are refused: reading a pipe would wait for
+/// its writer, and a device may never end.
 class InputFile {
  public:
   /// what    how messages name the file

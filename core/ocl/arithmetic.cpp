@@ -46,23 +46,28 @@ constexpr Kind kKinds[] = {
      [](const Results &a, const Results &b) { return a.whole == b.whole && a.high == b.high; }},
 };
 
-struct Notices {
+struct SelfTests {
   std::mutex mutex;
-  std::map<std::string, std::string> by_device;  ///< device and driver -> its line
+  std::map<std::string, SelfTest> by_device;  ///< key: device and driver
 };
 
-Notices &notices() {
-  static Notices all;
+SelfTests &self_tests() {
+  static SelfTests all;
   return all;
 }
 
-std::string notice_of(Device &device) {
+SelfTest make_self_test(Device &device) {
   const std::vector<Operands> operands = arithmetic_operands();
-  const std::vector<std::string> kinds = differences(operands, compute_on(device, operands));
-  if (kinds.empty()) return {};
-  return fmt::format(
-      "device '{}' computes {} differently: pictures may differ from other devices' in last bits",
-      device.info().name, fmt::join(kinds, ", "));
+  const Computed computed = compute_on(device, operands);
+  const std::vector<std::string> kinds = differences(operands, computed.results);
+  std::string notice;
+  if (!kinds.empty()) {
+    notice = fmt::format(
+        "device '{}' computes {} differently: pictures may differ from other devices' in last "
+        "bits",
+        device.info().name, fmt::join(kinds, ", "));
+  }
+  return {std::move(notice), computed.largest_group};
 }
 
 }  // namespace
@@ -107,8 +112,9 @@ std::vector<std::string> differences(std::span<const Operands> operands,
   return found;
 }
 
-std::vector<Results> compute_on(Device &device, std::span<const Operands> operands) {
+Computed compute_on(Device &device, std::span<const Operands> operands) {
   std::vector<Results> results(operands.size());
+  std::size_t largest_group = 0;
   // By OpenCL alone, since neither ledger nor timer are to count it.
   try {
     cl::Kernel kernel(device.build("arithmetic", {}), "arithmetic");
@@ -120,10 +126,10 @@ std::vector<Results> compute_on(Device &device, std::span<const Operands> operan
     const cl::CommandQueue &queue = device.queue();
     queue.enqueueWriteBuffer(given, CL_TRUE, 0, operands.size_bytes(), operands.data());
     // PoCL 3.1 ends the process if it is to choose a size and has groups of one work-item alone.
+    largest_group = kernel.getWorkGroupInfo<CL_KERNEL_WORK_GROUP_SIZE>(
+        device.context().getInfo<CL_CONTEXT_DEVICES>().front());
     const std::size_t limit =
-        std::min<std::size_t>(device.capabilities().max_work_group_size,
-                              kernel.getWorkGroupInfo<CL_KERNEL_WORK_GROUP_SIZE>(
-                                  device.context().getInfo<CL_CONTEXT_DEVICES>().front()));
+        std::min<std::size_t>(largest_group, device.capabilities().max_work_group_size);
     const std::size_t group_size = std::bit_floor(std::clamp<std::size_t>(limit, 1, 64));
     queue.enqueueNDRangeKernel(
         kernel, cl::NullRange,
@@ -135,23 +141,23 @@ std::vector<Results> compute_on(Device &device, std::span<const Operands> operan
     throw Error("device '{}' fails the test of its arithmetic: {}: {}", device.info().name,
                 error.what(), error_name(error.err()));
   }
-  return results;
+  return {std::move(results), static_cast<std::uint32_t>(largest_group)};
 }
 
-std::string arithmetic_notice(Device &device) {
+SelfTest self_test(Device &device) {
   const DeviceInfo &info = device.info();
   const std::string key = fmt::format("{}\n{}\n{}", info.platform, info.name, info.driver_version);
-  const std::lock_guard lock(notices().mutex);
-  const auto found = notices().by_device.find(key);
-  if (found != notices().by_device.end()) return found->second;
-  return notices().by_device[key] = notice_of(device);
+  const std::lock_guard lock(self_tests().mutex);
+  const auto found = self_tests().by_device.find(key);
+  if (found != self_tests().by_device.end()) return found->second;
+  return self_tests().by_device[key] = make_self_test(device);
 }
 
 std::vector<std::string> arithmetic_notices() {
-  const std::lock_guard lock(notices().mutex);
+  const std::lock_guard lock(self_tests().mutex);
   std::vector<std::string> lines;
-  for (const auto &[device, line] : notices().by_device) {
-    if (!line.empty()) lines.push_back(line);
+  for (const auto &[device, test] : self_tests().by_device) {
+    if (!test.notice.empty()) lines.push_back(test.notice);
   }
   return lines;
 }

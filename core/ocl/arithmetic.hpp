@@ -19,18 +19,30 @@ std::vector<Operands> arithmetic_operands();
 std::vector<std::string> differences(std::span<const Operands> operands,
                                      std::span<const Results> results);
 
+struct Computed {
+  std::vector<Results> results;     ///< [operands]
+  std::uint32_t largest_group = 0;  ///< work-items that a group of the kernel may have
+};
+
 /// Has a device compute the operands. A few milliseconds; waits.
 ///
 /// Throws  Error: the kernel does not build, or the device fails
-std::vector<Results> compute_on(Device &device, std::span<const Operands> operands);
+Computed compute_on(Device &device, std::span<const Operands> operands);
 
-/// One line on what a device computes otherwise than the host, or nothing. A process asks each
-/// device once.
+/// What the self-test says of a device.
+struct SelfTest {
+  std::string notice;  ///< one line on what it computes otherwise than the host, or nothing
+  /// Work-items of a group. The self-test's kernel is as small as a kernel can be: none may have
+  /// larger groups.
+  std::uint32_t largest_group = 0;
+};
+
+/// A process tests each device once.
 ///
 /// Throws  as compute_on()
-std::string arithmetic_notice(Device &device);
+SelfTest self_test(Device &device);
 
-/// The lines of arithmetic_notice() so far, each once.
+/// The notices of self_test() so far, each once.
 std::vector<std::string> arithmetic_notices();
 
 }  // namespace isowave::core::ocl

@@ -99,7 +99,11 @@ Device::Device(const DeviceInfo &info, bool profiling) : info_(info), device_(de
     throw Error("cannot open device '{}' ({}): {}: {}", info_.name, info_.platform, error.what(),
                 error_name(error.err()));
   }
-  notice_ = arithmetic_notice(*this);
+  const SelfTest test = self_test(*this);
+  notice_ = test.notice;
+  // Mesa's llvmpipe says 1024, and 32 of each kernel. Kernels would be compiled for both.
+  std::uint32_t &largest_group = info_.capabilities.max_work_group_size;
+  largest_group = std::min(largest_group, std::max(1u, test.largest_group));
 }
 
 cl::CommandQueue &Device::transfer_queue() {

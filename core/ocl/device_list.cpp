@@ -85,7 +85,7 @@ bool has_watchdog(const cl::Device &device, std::string_view extensions) {
 }
 
 /// An estimate, not a measurement on slow GPUs: an H100 (132 units, 1980 MHz) takes 1 ns for a ray
-/// of a cold frame (bench/README.md). By units and clock, a GPU of 3 units at 1400 MHz takes 62 ns,
+/// of a cold frame (bench/h100.md). By units and clock, a GPU of 3 units at 1400 MHz takes 62 ns,
 /// so its launches of 67,200 rays take 4 ms, and rays that are 20 times as long stay below 0.1 s.
 std::uint64_t elements_before_watchdog(std::uint32_t units, std::uint32_t megahertz) {
   constexpr std::uint64_t kElementsPerUnitMegahertz = 16, kLeast = 1u << 16;

@@ -310,7 +310,8 @@ std::vector<HitRecord> DeviceRenderer::cast_rays(std::span<const WorldRay> world
   return hits;
 }
 
-/// Of all levels: the finest draws given rays, seen as a picture of so many.
+/// Constants of all levels for a list of rays, as a picture of columns x rows; the finest level
+/// draws them.
 std::vector<FrameParams> DeviceRenderer::frames_of_rays(std::uint32_t columns, std::uint32_t rows,
                                                         float isovalue) const {
   std::vector<FrameParams> frames = make_level_grids(infos_of(blocks_.levels));

@@ -155,7 +155,7 @@ class DeviceRenderer : public Renderer {
   std::array<float, 2> value_range_;  ///< of the volume before compression
   ImageSize size_;                    ///< of the frame at work, or the last
   bool has_picture_ = false;          ///< the hit buffer has the frame's hits so far
-  /// Of the last frame: camera and isovalue.
+  /// Camera and isovalue of the last frame.
   std::optional<std::pair<Camera, float>> last_view_;
   /// Whether a single pass was enough: for the last frame that showed a new view [0], and for the
   /// last that showed the same view again [1].

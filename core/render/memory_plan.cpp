@@ -27,13 +27,13 @@ constexpr std::uint64_t kWindowBytes = 2u << 20;
 /// for every two rays, and most again in the next frame.
 constexpr std::uint64_t kRaysPerUsefulSlot = 8;
 
-/// A surface of a volume of n^3 blocks is in about n^2. Of turbulence, a cold frame of pipeline
-/// `rays` decodes 6 n^2, of 256^3 voxels as of 1024^3; pipeline `blocks`, which asks for whole dual
-/// grids, 9.6 n^2 (bench/README.md).
+/// Slots per n^2 for a volume of n^3 blocks, whose surface is in about n^2 of them. A cold frame of
+/// turbulence decodes 6 n^2 blocks in pipeline `rays`, at 256^3 voxels and at 1024^3, and 9.6 n^2
+/// in pipeline `blocks`, which requests whole dual grids (bench/h100.md).
 constexpr double kSlotsPerFace = 12;
 /// A small picture needs a smaller cache: at most 5 slots per 8 rays.
 constexpr std::uint64_t kRaysPerSlot = 8, kSlotsOfThose = 5;
-/// Where that keeps the plan below the decoded volume, a cache begins with as little as half.
+/// A cache begins with as little as half if that keeps the plan below the decoded volume.
 constexpr std::uint64_t kLeastPart = 2;
 /// Least initial size of a cache, 2^14 slots (5.3 MB), or all blocks if there are fewer: a frame of
 /// a small noisy volume needs most of its blocks.
@@ -52,7 +52,7 @@ std::uint32_t window_blocks_for(const CompressedVolume &volume, const MemoryRequ
   return static_cast<std::uint32_t>(std::max<std::uint64_t>(wanted, kMinCacheSlots));
 }
 
-/// Of one level of detail, or of the volume itself.
+/// Buffers of the stream of one level of detail, or of the volume itself.
 ocl::BufferSizes stream_sizes(const MemoryPlan &plan, const CompressedVolume &volume,
                               const MemoryRequest &request) {
   if (plan.stream == StreamPlace::kHost)
@@ -69,7 +69,7 @@ ocl::BufferSizes stream_sizes(const MemoryPlan &plan, const CompressedVolume &vo
   return DeviceStream::sizes(volume, split, request.with_bounds);
 }
 
-/// What the volume, or one of its levels of detail, needs for itself.
+/// Adds the buffers of the volume, or of one of its levels of detail.
 void add_level(MemoryPlan &plan, const CompressedVolume &volume, const MemoryRequest &request) {
   const ocl::BufferSizes stream = stream_sizes(plan, volume, request);
   plan.stream_bytes += stream.bytes();

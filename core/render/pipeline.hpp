@@ -49,7 +49,7 @@ class Pipeline {
 };
 using PipelinePtr = std::shared_ptr<const Pipeline>;
 
-/// The default: it was faster in nearly all that was measured (bench/README.md).
+/// The default: it was faster in nearly all that was measured (bench/h100.md).
 PipelinePtr rays_pipeline();
 
 }  // namespace isowave::core

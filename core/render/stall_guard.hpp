@@ -28,9 +28,8 @@ class StallGuard {
     num_stalled_ = stalled ? num_stalled_ + 1 : 0;
     if (num_stalled_ > limit_)
       throw Error(
-          "{} rays wait for blocks that nobody asks for, for {} passes now: a fault of isowave or "
-          "of this "
-          "OpenCL driver; please report it",
+          "{} rays have waited for {} passes for blocks that none of them requests: a fault of "
+          "isowave or of this OpenCL driver; please report it",
           counts.next_active_count, num_stalled_);
   }
 

@@ -10,8 +10,8 @@ namespace isowave::core {
 namespace {
 
 constexpr double kFinestCell = 4;  // voxels: the noise of the finest octave is resolved
-/// Of an octave's amplitude to that of the one below where velocities have a k^(-5/3) spectrum:
-/// 2^(-1/3).
+/// Ratio of an octave's amplitude to that of the octave below, for velocities with a spectrum of
+/// k^(-5/3): 2^(-1/3).
 constexpr double kTurbulent = 0.79370;
 constexpr std::uint32_t kAsFineAsResolved = std::numeric_limits<std::uint32_t>::max();
 

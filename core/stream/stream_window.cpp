@@ -13,9 +13,10 @@ namespace {
 /// Blocks that one thread gathers at a time: a random read of memory each, far more than what
 /// starting a thread costs.
 constexpr std::size_t kGatherBlocks = 4096;
-/// Of the request list, so many are read together with its length: one round trip instead of two.
+/// Entries of the request list that are read together with its length: one round trip instead of
+/// two.
 constexpr std::size_t kIdsAtOnce = 4096;
-/// Of a payload that is copied, so many are read at a time.
+/// Words of a copied payload that are read at a time.
 constexpr std::uint64_t kCopyWords = 1u << 20;
 
 void wait(const cl::Event &event) {

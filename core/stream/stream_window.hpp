@@ -32,9 +32,9 @@ class StreamWindow {
   /// Words of one block in the window, where each begins with a whole word: of every block at a
   /// fixed rate, otherwise of most.
   static std::uint64_t words_per_block(const CompressedVolume &volume);
-  /// Of both halves and their staging memory. Each holds blocks, before them where each begins and
-  /// ends unless all are alike (kernels_cl/device/block_stream.h), and behind them two words that
-  /// decoders read past their block.
+  /// Buffers of both halves and their staging memory. Each half holds the places where blocks begin
+  /// and end (kernels_cl/device/block_stream.h) unless all have one length, then the blocks, then
+  /// two words that decoders read past their block.
   static ocl::BufferSizes sizes(const CompressedVolume &volume, std::uint32_t window_blocks);
 
   /// Enqueues launches that read blocks block_ids[first .. first + count), one after the other in
@@ -65,7 +65,7 @@ class StreamWindow {
   StreamWindow(ocl::Device &device, const CompressedVolume &volume, std::uint32_t window_blocks,
                const ocl::BufferSizes &sizes);
   void copy_payload(std::uint64_t max_copy);
-  /// Of block_ids, how many of the first fit one half; at least one.
+  /// The number of the first block_ids that fit one half; at least one.
   std::size_t run_length(std::span<const uint> block_ids) const;
   /// The volume's bits from the beginning of block block_id on, as many as `out` has.
   void read_block(std::uint32_t block_id, std::span<uint> out) const;

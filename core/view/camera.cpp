@@ -19,8 +19,8 @@ using nlohmann::json;
 
 /// sin of the smallest angle between view and up: below it the image's right is rounding noise.
 constexpr double kMinSinViewUp = 1e-6;
-/// Of eye to at, and of up: squares of longer vectors, and of those as much shorter than 1, leave
-/// double's range.
+/// Greatest length of eye to at, and of up. Squares of longer vectors, and of vectors as much
+/// shorter than 1, leave double's range.
 constexpr double kLongest = 0x1p500;
 
 const json &member(const json &object, const char *key, const std::string &where) {
@@ -196,8 +196,7 @@ std::vector<Camera> orbit_cameras(const VolumeInfo &info, std::uint32_t n) {
   const glm::dmat3 index_to_world = info.index_to_world();
   const glm::dvec3 extent(info.dims - 1u);
   const glm::dvec3 centre = info.origin + index_to_world * (0.5 * extent);
-  // Of the four diagonals of a sheared box the one from its first to its last voxel counts; all are
-  // equal otherwise.
+  // A sheared box has four different diagonals: the one from the first to the last voxel counts.
   const double distance = 0.8 * glm::length(index_to_world * extent);
 
   std::vector<Camera> cameras;

@@ -64,8 +64,7 @@ void check_drawable(const VolumeInfo &info, std::string_view what);
 
 BlockGrid make_grid(const VolumeInfo &info);
 
-/// Of a volume without levels of detail, and without a camera: for what is done before there is
-/// one.
+/// Constants of a volume without levels of detail, for work that needs no camera.
 FrameParams make_grid_params(const VolumeInfo &info);
 
 /// Computes the camera basis once, in double, and maps it to index space.

@@ -20,8 +20,8 @@ namespace {
 
 constexpr std::uint64_t kChunkVoxels = 1ull << 22;  // enough to keep threads busy, 16 MiB
 
-/// Memory that nobody touches before voxels are read into it: a packed file may claim a thousand
-/// times more of them than it has, and ends before they are missed.
+/// Memory that stays untouched until voxels are read into it. A packed file may claim a thousand
+/// times more voxels than it has; reading fails before their memory is touched.
 template <class Value>
 class Untouched {
  public:

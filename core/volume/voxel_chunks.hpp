@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <span>
 
@@ -23,6 +24,9 @@ inline constexpr float kMaxMagnitude = 0x1p126f;
 inline constexpr float kMinMagnitude = 0x1p-97f;
 
 inline constexpr std::uint32_t kBlockEdge = 4;  ///< voxels
+
+/// Opens a reader at the volume's front, each time it is called.
+using OpenReader = std::function<std::unique_ptr<VolumeReader>()>;
 
 /// A volume that processes read together: of layers that several have, one counts what is found.
 struct VolumePart {
@@ -99,7 +103,8 @@ struct ValueRange {
   std::array<float, 2> coded{};    ///< as float32, tiny ones before they become 0
   std::array<double, 2> source{};  ///< as the source has them
 };
-/// Reads the volume from front to back for `coder`. Of a part, all processes make the same call.
+/// Reads the volume from front to back for `coder`. If the reader has a part of a volume, all
+/// processes make the same call.
 ///
 /// Throws  Error: voxels that cannot be compressed, after all of them were looked at; a bad grid;
 ///         an unfit map_nan or no_data

@@ -36,7 +36,7 @@ class BlockCutter {
   std::vector<std::uint64_t> wide_;  ///< ... and in words of 64 bits
 };
 
-/// Of the bounds of a level's blocks, those of a box.
+/// Picks the bounds of a box of blocks from the bounds of a level.
 class BoundsCutter {
  public:
   /// blocks  of the level, along each axis
@@ -62,7 +62,7 @@ CompressedVolume cut_blocks(const CompressedVolume &whole, const BlockBox &box);
 /// the payload is not looked at.
 ///
 /// Throws  Error as read_zfp_file_info(); a damaged index, damaged bounds; a file of zfp's own tool
-///         whose blocks have lengths of their own, since nobody knows where they begin
+///         whose blocks have lengths of their own, since it does not say where they begin
 CompressedVolume read_zfp_blocks(const std::filesystem::path &path, std::span<const BlockBox> boxes,
                                  bool with_bounds);
 

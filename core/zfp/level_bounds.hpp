@@ -62,9 +62,9 @@ class LevelBounds {
   Off off_;                                  ///< against the fine level
 };
 
-/// Never below.
+/// Bounds as codes, which are never below them.
 BlockBounds encode_bounds(std::span<const float> bounds);
-/// Of some blocks of a level, whose largest bound is that.
+/// The same for a part of a level's blocks. largest: the largest bound of the whole level.
 BlockBounds encode_bounds(std::span<const float> bounds, float largest);
 /// Exponents that they can have.
 inline constexpr std::int32_t kMinBoundExponent = -126, kMaxBoundExponent = 127;
@@ -86,7 +86,7 @@ struct LevelError {
   float unit = 0;                 ///< and of its block's bound besides
   double largest = 0;             ///< of all values
 };
-/// Of the whole level, also where these are a brick's.
+/// The largest bound of the whole level, even if `bounds` are a brick's.
 float largest_bound(const BlockBounds &bounds);
 
 /// How far decoded values may be from those of all bit planes where with_fewer_planes(bound,

@@ -366,7 +366,7 @@ std::vector<std::uint32_t> ErrorBoundCoder::finish() {
 
 namespace {
 
-/// Of `words` from bit `bit` on, how many of the bits in that word are 0 before the first 1.
+/// The number of zeros from bit `bit` on, up to the first 1 or the end of the word.
 std::uint32_t zeros_at(std::span<const std::uint32_t> words, std::uint64_t bit) {
   const auto left = static_cast<std::uint32_t>(32 - bit % 32);
   return std::min(static_cast<std::uint32_t>(std::countr_zero(words[bit / 32] >> bit % 32)), left);

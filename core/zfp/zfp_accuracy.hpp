@@ -81,7 +81,7 @@ class ErrorBoundCoder : public ChunkCoder {
   /// Hands over the last bits, as words of 32; returns the index.
   std::vector<std::uint32_t> finish();
   std::optional<BlockErrors> &errors() { return errors_; }
-  /// Of the last chunk, in its layout, where errors are measured.
+  /// The last chunk as it is decoded, in its layout; only if errors are measured.
   std::span<const float> decoded() const { return decoded_; }
 
  private:

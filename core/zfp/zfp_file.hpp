@@ -18,8 +18,8 @@
 
 namespace isowave::core {
 
-/// What index, bounds and masks are deflated by. The same bytes come in the same pieces, whoever
-/// writes.
+/// Deflates index, bounds and masks. One process and a team of processes give the same bytes in the
+/// same pieces.
 class Deflater {
  public:
   using Sink = std::function<void(std::span<const std::byte>)>;
@@ -39,7 +39,7 @@ class Deflater {
 };
 inline constexpr std::size_t kDeflatedAtOnce = 1u << 15;
 
-/// Of the footer; has_levels: others are in its file.
+/// The version in the footer. has_levels: the file has coarser levels, too.
 std::uint32_t zfp_version(const CompressedVolume &volume, bool has_levels);
 
 /// Writes a `.zfp` file front to back, its levels of detail beside each other; nothing is left

@@ -69,7 +69,7 @@ struct BlockBounds {
   /// A voxel is off by its share (bound_share()) at most. Only where voxels are compared with the
   /// source's.
   bool by_place = false;
-  /// Of a brick's level: the largest code in all bricks, since what float32 loses goes by that.
+  /// A brick's level: the largest code in all bricks, which decides what float32 loses.
   std::uint8_t largest_of_whole = 0;
 };
 

@@ -92,7 +92,7 @@ ZfpLayout apply_json(const json &trailer, CompressedVolume &volume) {
   if (trailer.contains("bounds_bytes")) {
     layout.bounds_bytes = number_from<std::uint64_t>(trailer["bounds_bytes"]);
     volume.bounds.exponent = number_from<std::int32_t>(trailer.at("bounds_exponent"));
-    // Of another rule, all voxels of a block have its whole bound.
+    // With another rule, all voxels of a block have its whole bound.
     volume.bounds.by_place = trailer.value("bounds_by_place", json(0)) == ISO_BOUND_PLACES_RULE;
   }
   if (trailer.contains("no_data_bytes")) {

@@ -27,9 +27,9 @@ struct ZfpFooter {
 static_assert(sizeof(ZfpFooter) == 24);
 
 std::uint32_t update_crc(std::uint32_t crc, std::span<const std::byte> bytes);
-/// Of what `first` is the checksum of, and behind it so many bytes of checksum `second`.
+/// The checksum of two parts together, from the checksum of each and the bytes of the second.
 std::uint32_t combine_crcs(std::uint32_t first, std::uint32_t second, std::uint64_t second_bytes);
-/// Of the JSON text and the footer's numbers before its own.
+/// The checksum of the JSON text and of the footer's numbers before json_crc.
 std::uint32_t json_crc(std::string_view text, const ZfpFooter &footer);
 
 /// What the JSON text says of the file itself.

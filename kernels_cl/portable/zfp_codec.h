@@ -16,9 +16,8 @@
 
 ISO_NAMESPACE_BEGIN
 
-/// Coefficients travel in order of total sequency i + j + k, then i^2 + j^2 + k^2: stream position
-/// -> i + 4 j
-/// + 16 k.
+/// [position in the stream] i + 4 j + 16 k of the coefficient. Coefficients are in order of total
+/// sequency i + j + k, then of i^2 + j^2 + k^2.
 ISO_CONSTANT static const uchar iso_zfp_order[64] = {
     0,  1,  4,  16, 20, 17, 5,  2,  8,  32, 21, 6,  18, 24, 9,  33, 36, 3,  12, 48, 22, 25,
     37, 40, 34, 10, 7,  19, 28, 13, 49, 52, 41, 38, 26, 23, 29, 53, 11, 35, 44, 14, 50, 56,

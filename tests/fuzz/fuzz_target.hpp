@@ -18,7 +18,7 @@ extern "C" {
 int LLVMFuzzerTestOneInput(const std::uint8_t *data, std::size_t size);
 std::size_t LLVMFuzzerCustomMutator(std::uint8_t *data, std::size_t size, std::size_t max_size,
                                     unsigned seed);
-/// Of libFuzzer: changes an input in place and returns its new size, at least 1.
+/// libFuzzer's own: changes an input in place and returns its new size, at least 1.
 std::size_t LLVMFuzzerMutate(std::uint8_t *data, std::size_t size, std::size_t max_size);
 }
 

@@ -1,6 +1,6 @@
-// Compressed volumes. Input: the file. Of one that is accepted, our decoder and libzfp decode each
-// block to the same bits, what is written again reads the same, and its stated errors are checked.
-// Mutations change what checksums and compression guard (zfp_parts.hpp).
+// Compressed volumes. Input: the file. If a file is accepted, our decoder and libzfp decode each
+// block to the same bits, the file reads the same after it is written again, and its stated errors
+// are checked. Mutations change what checksums and compression guard (zfp_parts.hpp).
 
 #include <algorithm>
 #include <array>

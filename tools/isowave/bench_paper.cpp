@@ -1,27 +1,25 @@
-// The JSON, of each volume and method. Summaries have mean, median, min, max, count; null: of
-// nothing.
+// The JSON, for each volume and method. Summaries have mean, median, min, max, count; null: there
+// are no values.
 //
 //   new_ms         frames of an isovalue that was not drawn before, from the first camera; caches
 //                  are as the frames before have left them
 //   next_ms        the same isovalue from the other cameras
-//   cold_ms        as new_ms, but nothing is decoded beforehand; of rays from all cameras
-//   visible_blocks of a pass: distinct blocks in which rays are intersected (pipeline blocks)
-//   active_blocks  distinct blocks that are decoded for a picture: for a cold frame of rays, or a
-//                  mesh
-//   touched_blocks of a pass: distinct blocks whose voxels its rays look at; of what progress is of
-//   n_spec         of a pass: blocks that a ray is to look ahead at, mean of its rays
-//   utilization    of a pass: ray-block pairs that are intersected, per pixel
-//   completed      after each pass: rays that have ended, of all pixels, or of those that met an
-//                  active block; a frame that is through counts as 100
-//   progress       of cold first views, waited for after each pass: ms since the frame's beginning
-//   look_ahead     "global", the paper's; "per-ray"; "off"; "scanned": global, but what rays with
-//   few
-//                  blocks before them leave goes to others
+//   cold_ms        as new_ms, but nothing is decoded beforehand; rays: from all cameras
+//   visible_blocks distinct blocks in which a pass intersects rays (pipeline blocks)
+//   active_blocks  distinct blocks that are decoded for a cold frame of rays, or for a mesh
+//   touched_blocks distinct blocks whose voxels the rays of a pass look at, in cold first views
+//   n_spec         blocks that the rays of a pass are to look ahead at, mean
+//   utilization    ray-block pairs that a pass intersects, per pixel
+//   completed      rays that have ended after each pass, among all pixels, or among those that met
+//                  an active block; a finished frame counts as 100
+//   progress       ms since the frame's beginning after each pass of cold first views, with a wait
+//                  after each pass
+//   look_ahead     "global", the paper's; "per-ray"; "off"; "scanned": global, but rays with few
+//                  blocks before them leave places to others
 //   limits         cold frames of a tenth of the isovalues, from two cameras, by the most blocks
-//   that
-//                  rays look ahead at
-//   cache          of rays: "default" slots, or as many as the cold frames needed at most, "one
-//                  frame"
+//                  that rays look ahead at
+//   cache          "default" slots of rays, or "one frame": as many as the cold frames needed at
+//                  most
 //   device_bytes   the peak of all buffers; cache_bytes: those of the block cache among them
 
 #include "tools/isowave/bench_paper.hpp"
@@ -70,7 +68,7 @@ struct BenchPaperArgs {
   bool quick = false;
 };
 
-/// Of the protocol, what --quick leaves.
+/// The part of the protocol that --quick leaves.
 constexpr std::uint32_t kQuickIsovalues = 4, kQuickViews = 2;
 constexpr const char *kQuickSize = "640x360";
 
@@ -293,14 +291,14 @@ void add_bench_paper(CLI::App &bench) {
   const auto options = std::make_shared<BenchPaperArgs>();
   command
       ->add_option("VOLUME", options->inputs,
-                   "a .zfp file, " + std::string(kVolumeHelp) + "; of a folder, all volumes in it")
+                   "a .zfp file, " + std::string(kVolumeHelp) + ", or a folder: all volumes in it")
       ->required();
   CLI::Option *isovalues =
-      command->add_option("--isovalues", options->isovalues, "random isovalues, seeded")
+      command->add_option("--isovalues", options->isovalues, "number of random isovalues")
           ->check(CLI::Range(1u, 10000u))
           ->capture_default_str();
   CLI::Option *views =
-      command->add_option("--views", options->views, "views on an orbit, of each isovalue")
+      command->add_option("--views", options->views, "views on an orbit, for each isovalue")
           ->check(CLI::Range(1u, 1000u))
           ->capture_default_str();
   CLI::Option *size =
@@ -313,8 +311,8 @@ void add_bench_paper(CLI::App &bench) {
           ->capture_default_str();
   command
       ->add_option("--limits", options->limits,
-                   "most blocks to look ahead at, 1 to 64, by which passes and decoded blocks are "
-                   "compared; a list")
+                   "most blocks that a ray may look ahead at, 1 to 64, to compare passes and "
+                   "decoded blocks; a list")
       ->check(CLI::Range(1u, 64u))
       ->delimiter(',')
       ->allow_extra_args(false)
@@ -324,25 +322,26 @@ void add_bench_paper(CLI::App &bench) {
                    "isovalues of interest, LOW HIGH [the middle 80 % of the values]")
       ->expected(2)
       ->check(fits_float32());
-  command->add_option("--seed", options->seed, "of the isovalues")->capture_default_str();
+  command->add_option("--seed", options->seed, "seed of the isovalues")->capture_default_str();
   command
       ->add_option("--bcmc-budget", options->bcmc_budget,
-                   "memory budget of Block-Compressed Marching Cubes where that is bounded [what "
-                   "pipeline rays takes with slots for a frame]")
+                   "memory budget of bounded Block-Compressed Marching Cubes [memory of pipeline "
+                   "rays with slots for a frame]")
       ->transform(byte_count())
       ->type_name("BYTES");
-  command->add_flag("--quick", options->quick,
-                    fmt::format("{} isovalues, {} views, {}, no further sizes, but what is asked "
-                                "for: shows that all works",
-                                kQuickIsovalues, kQuickViews, kQuickSize));
+  command->add_flag(
+      "--quick", options->quick,
+      fmt::format("{} isovalues, {} views, {}, no further sizes, unless other options "
+                  "say otherwise: shows that all works",
+                  kQuickIsovalues, kQuickViews, kQuickSize));
   add_volume_options(*command, options->volume);
   add_compression_options(*command, options->compression);
   command->add_option("--device", options->device,
                       "device: index, cpu, gpu, or a part of its name");
   command->add_option("--pictures", options->pictures,
-                      "a folder for two pictures of each volume: its first view by rays, and by "
+                      "folder for two pictures of each volume: its first view by rays, and by "
                       "triangles");
-  command->add_option("--json", options->json, "write all that was measured");
+  command->add_option("--json", options->json, "file for all results, as JSON");
   command->callback([=] {
     if (options->quick) {
       if (isovalues->count() == 0) options->isovalues = kQuickIsovalues;

@@ -29,7 +29,7 @@ double median_of(std::vector<double> values) {
   return values.size() % 2 == 1 ? values[middle] : 0.5 * (values[middle - 1] + values[middle]);
 }
 
-/// Of no values: null.
+/// Null if there are no values.
 ordered_json summary(const std::vector<double> &values) {
   if (values.empty()) return nullptr;
   const auto [least, most] = std::ranges::minmax_element(values);

@@ -294,7 +294,7 @@ void print_header() {
              "wrong", "depth p99", "normal", "FLIP", "PSNR");
 }
 
-/// Of the range of values, which may be none.
+/// The error as a part of the range of values, which may be 0 if the error is 0.
 double part_of(double value_range, double voxel_error) {
   return voxel_error == 0 ? 0 : voxel_error / value_range;
 }
@@ -491,32 +491,34 @@ void add_bench_pareto(CLI::App &bench) {
   add_volume_options(*command, options->volume);
   command
       ->add_option("--storage", options->storages,
-                   "how the volume is compressed: rate:R, tolerance:E, tolerance-relative:E or "
+                   "ways to compress the volume: rate:R, tolerance:E, tolerance-relative:E or "
                    "exact; a list")
       ->delimiter(',')
       ->capture_default_str();
-  command->add_option("--pipeline", options->pipelines, "rays, blocks; a list")
+  command->add_option("--pipeline", options->pipelines, "pipelines: rays, blocks; a list")
       ->delimiter(',')
       ->check(CLI::IsMember({"rays", "blocks"}))
       ->capture_default_str();
-  command->add_option("--solver", options->solvers, "linear, marmitt, analytic, bernstein; a list")
+  command
+      ->add_option("--solver", options->solvers,
+                   "root finders: linear, marmitt, analytic, bernstein; a list")
       ->delimiter(',')
       ->capture_default_str();
   command
       ->add_option("--voxel-pixels", options->all_voxel_pixels,
-                   "see render; a list; pipeline blocks takes 0 only")
+                   "as for render; pipeline blocks takes only 0; a list")
       ->delimiter(',')
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command
       ->add_option("--voxel-error", options->voxel_errors,
-                   "see render, but as parts of the range of values; a list")
+                   "as for render, but as parts of the range of values; a list")
       ->delimiter(',')
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command
       ->add_option("--max-surface-error", options->max_surface_errors,
-                   "what render chooses for these, as points of their own; a list, 0: none")
+                   "as for render, 0: none; each value is one more point; a list")
       ->delimiter(',')
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
@@ -526,12 +528,12 @@ void add_bench_pareto(CLI::App &bench) {
       ->capture_default_str();
   command
       ->add_option("--rounds", options->rounds,
-                   "times that each view is drawn; the median of all counts")
+                   "number of times that each view is drawn; the median counts")
       ->check(CLI::Range(1u, 10000u))
       ->capture_default_str();
   command->add_option("--device", options->device,
                       "device: index, cpu, gpu, or a part of its name");
-  command->add_option("--json", options->json, "write the results for tools/charts");
+  command->add_option("--json", options->json, "file for the results, for tools/charts");
   command->callback([options] { run_bench_pareto(*options); });
 }
 

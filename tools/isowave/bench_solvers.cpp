@@ -418,17 +418,17 @@ void add_bench_solvers(CLI::App &bench) {
       ->required();
   add_volume_options(*command, options->volume);
   command->add_option("--rate", options->compression.rate,
-                      "bits per voxel of volumes that are compressed [as many as keep all that "
-                      "float32 holds]");
+                      "bits per voxel for volumes that are not compressed yet [as many as float32 "
+                      "needs]");
   command->add_option("--size", options->size, "picture size WxH")->capture_default_str();
   command
       ->add_option("--rounds", options->rounds,
-                   "times that everything is measured; the median counts")
+                   "number of times that everything is measured; the median counts")
       ->check(CLI::Range(1u, 10000u))
       ->capture_default_str();
   command->add_option("--device", options->device,
                       "device: index, cpu, gpu, or a part of its name");
-  command->add_option("--json", options->json, "write the results for tools/charts");
+  command->add_option("--json", options->json, "file for the results, for tools/charts");
   command->add_option(
       "--pictures", options->pictures,
       "folder for VOLUME_SOLVER.png: missed pixels red, false blue, unstable yellow");

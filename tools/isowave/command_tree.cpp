@@ -4,7 +4,7 @@ namespace isowave::core::tools {
 
 namespace {
 
-/// Of "TEXT:{auto,blocks,rays}", as CLI11 describes a value that is one of a set.
+/// The values in "TEXT:{auto,blocks,rays}", as CLI11 describes one of a set.
 std::vector<std::string> choices_of(const std::string &type) {
   const std::size_t begin = type.find('{'), end = type.find('}');
   if (begin == std::string::npos || end == std::string::npos) return {};

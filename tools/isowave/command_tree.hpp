@@ -1,6 +1,6 @@
 #pragma once
-// What the command line has, for whoever describes it: completion scripts and the man page. Taken
-// from CLI11, so that nothing is written twice.
+// The commands and options of the command line, for completion scripts and the man page. CLI11
+// supplies them, so that nothing is written twice.
 
 #include <CLI/CLI.hpp>
 #include <string>

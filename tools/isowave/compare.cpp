@@ -122,9 +122,9 @@ void run_compare(const CompareArgs &args) {
 void add_compare(CLI::App &app) {
   const auto args = std::make_shared<CompareArgs>();
   CLI::App *command = app.add_subcommand("compare", "Compare two depth images (.npy) or two PNGs");
-  command->add_option("A", args->a, "The truth, where one of them is")->required();
+  command->add_option("A", args->a, "The true image, if one of the two is")->required();
   command->add_option("B", args->b, "The image under test")->required();
-  command->add_flag("--exact", args->exact, "Exit with status 1 when any bit differs");
+  command->add_flag("--exact", args->exact, "Exit with status 1 if any bit differs");
   command->add_flag("--json", args->json, "Print the result as JSON");
   command->callback([args] { run_compare(*args); });
 }

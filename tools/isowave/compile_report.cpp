@@ -11,7 +11,7 @@ namespace isowave::core::tools {
 
 namespace {
 
-/// Below, nobody has waited, and looking through the driver's folder is not worth it.
+/// Shorter compilations are not worth looking through the driver's folder: no user notices them.
 constexpr double kWorthSayingMs = 250;
 
 }  // namespace

@@ -119,7 +119,7 @@ std::string fish_script(const DescribedCommand &program) {
 void add_completion(CLI::App &app) {
   const auto shell = std::make_shared<std::string>();
   CLI::App *command = app.add_subcommand("completion", "Print a script that completes commands");
-  command->add_option("SHELL", *shell, "whose script")
+  command->add_option("SHELL", *shell, "shell that the script is for")
       ->required()
       ->check(CLI::IsMember({"bash", "zsh", "fish"}));
   command->callback([&app, shell] {

@@ -9,14 +9,15 @@
 #include <string_view>
 
 #include "core/base/error.hpp"
-#include "core/bricks/compress_together.hpp"
 #include "core/bricks/ranks.hpp"
 #include "core/io/atomic_file.hpp"
 #include "core/io/open_volume.hpp"
 #include "core/ocl/device.hpp"
 #include "core/sources/noise_on_device.hpp"
 #include "core/stages/zfp_encode.hpp"
+#include "core/zfp/compress_together.hpp"
 #include "core/zfp/describe_compression.hpp"
+#include "core/zfp/slabs.hpp"
 #include "core/zfp/zfp_accuracy.hpp"
 #include "tools/isowave/commands.hpp"
 #include "tools/isowave/compile_report.hpp"
@@ -140,14 +141,15 @@ void add_convert(CLI::App &app) {
   add_compression_options(*command, options->compression);
   command
       ->add_option("--map-nan", options->input.map_nan,
-                   "replace NaN and infinite voxels by this value")
+                   "value that replaces NaN and infinite voxels")
       ->check(fits_float32());
   command->add_option("--device", options->device,
-                      "compress on this device, at a fixed rate, and make generated voxels there: "
-                      "index, cpu, gpu, or a part of its name [the "
-                      "host's processors]; the "
-                      "file is the same");
-  command->add_option("--threads", options->input.num_threads, "0: one per processor")
+                      "device that compresses at a fixed rate, and makes generated voxels: index, "
+                      "cpu, gpu, or a part of its name; the file is the same [the host's "
+                      "processors]");
+  command
+      ->add_option("--threads", options->input.num_threads,
+                   "number of threads; 0: one per processor")
       ->capture_default_str();
   command->add_flag("--no-verify", options->no_verify,
                     "do not decode again to measure the largest error");

@@ -130,30 +130,30 @@ void add_extract(CLI::App &app) {
       app.add_subcommand("extract", "Write an isosurface as triangles: PLY, STL, OBJ, VTP, glTF");
   command->add_option("VOLUME", options->input, "a .zfp file, or " + std::string(kVolumeHelp))
       ->required();
-  command
-      ->add_option("-i,--isovalue", options->isovalue,
-                   "the value of the field whose surface is extracted")
+  command->add_option("-i,--isovalue", options->isovalue, "value of the field on the surface")
       ->check(fits_float32())
       ->required();
   command->add_option(
       "--output,-o", options->output,
-      "file that ends in .ply, .stl, .obj, .vtp, .gltf or .glb; coordinates are the "
+      "file that ends in .ply, .stl, .obj, .vtp, .gltf or .glb; coordinates are in the "
       "volume's world [VOLUME_isoV.ply in the current folder]");
   command
-      ->add_option(
-          "--level", options->level,
-          "level of detail, each of half the voxels along each axis; 0 is the volume itself")
+      ->add_option("--level", options->level,
+                   "level of detail: 0 is the volume itself, each further level halves the voxels "
+                   "along each axis")
       ->capture_default_str();
   command
       ->add_option(
           "--normals", options->normals,
-          "of vertices: smooth (central differences of voxels), or none, which needs fewer blocks")
+          "normals of vertices: smooth (central differences of voxels), or none, which needs fewer "
+          "blocks")
       ->check(CLI::IsMember({"smooth", "none"}))
       ->capture_default_str();
   command
-      ->add_option("--vertices", options->vertices,
-                   "apart: at least 1/1024 of a voxel's edge from voxels, so that no triangle is "
-                   "without area; exact: where the isovalue is crossed, on voxels too")
+      ->add_option(
+          "--vertices", options->vertices,
+          "places of vertices: apart (at least 1/1024 of an edge away from voxels, so that "
+          "every triangle has an area) or exact (at the isovalue, even on a voxel)")
       ->check(CLI::IsMember({"apart", "exact"}))
       ->capture_default_str();
   command->add_option("--device", options->device,
@@ -163,22 +163,23 @@ void add_extract(CLI::App &app) {
   command
       ->add_option("--memory-budget", options->extractor.memory_budget,
                    "bound on the buffers that are made on the device, e.g. 600MB (1000^2) or 1GiB "
-                   "(1024^3); surfaces that need more are gone through in batches [3/4 of the "
+                   "(1024^3); a surface that needs more is extracted in batches [3/4 of the "
                    "device's memory]")
       ->transform(byte_count())
       ->type_name("BYTES");
   command
       ->add_option("--cache-slots", options->extractor.cache_slots,
-                   "decoded blocks kept on the device at most, 17 to 2^26, without normals from 8 "
-                   "[as many as the surface needs]")
+                   "most decoded blocks on the device, 17 to 2^26, without normals 8 to 2^26 [as "
+                   "many as the surface needs]")
       ->check(CLI::Range(8u, 1u << 26));
   command
       ->add_option("--stream", options->stream,
-                   "where the compressed volume is: device, host (blocks are uploaded when they "
-                   "are asked for), or auto (on the device if that leaves a quarter of the budget)")
+                   "place of the compressed volume: device, host (blocks are uploaded on request), "
+                   "or auto (the device, if that leaves a quarter of the budget)")
       ->check(CLI::IsMember({"auto", "device", "host"}))
       ->capture_default_str();
-  command->add_option("--stats", options->stats, "JSON: blocks, batches, times, device memory");
+  command->add_option("--stats", options->stats,
+                      "file for JSON statistics: blocks, batches, times, device memory");
   group_options(*command, "Options of every day",
                 {"--help", "--isovalue", "--output", "--level", "--normals", "--vertices",
                  "--device", "--stats"});

@@ -77,9 +77,10 @@ CLI::Option *add_frame_options(CLI::App &command, FrameOptions &options) {
           ->allow_extra_args(false);  // one number each time: VOLUME may follow
   add_compression_options(command, options.compression);
   command
-      .add_option("--voxel-error", options.voxel_error,
-                  "how far decoded voxels may be from the compressed volume's: fewer bit planes "
-                  "are decoded")
+      .add_option(
+          "--voxel-error", options.voxel_error,
+          "largest difference of decoded voxels from the compressed volume's: decodes fewer "
+          "bit planes")
       ->capture_default_str();
   command.add_option("--size", options.size, "picture size WxH [1280x720, or the camera file's]");
   CLI::Option *orbit =

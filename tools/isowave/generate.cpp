@@ -91,21 +91,22 @@ void add_generate(CLI::App &app) {
       ->add_option("FIELD", options->field,
                    fmt::format("one of {}", fmt::join(field_names(), ", ")))
       ->required();
-  command->add_option("--dims", options->dims, "voxels: X Y Z, or N for a cube")
+  command->add_option("--dims", options->dims, "number of voxels: X Y Z, or N for a cube")
       ->expected(1, 3)
       ->required();
   command->add_option("--type", options->type, "voxel type")->capture_default_str();
-  command->add_option("--seed", options->generate.seed, "of fields of noise")
+  command->add_option("--seed", options->generate.seed, "seed of fields of noise")
       ->capture_default_str();
-  command->add_option(
-      "--device", options->device,
-      "make fields of noise on this device, if it is no CPU and has doubles: index, gpu, or a part "
-      "of its name [the host's processors]; the file is the same");
-  command->add_option("--threads", options->generate.num_threads, "0: one per processor")
+  command->add_option("--device", options->device,
+                      "device that makes fields of noise, if it is no CPU and has doubles: index, "
+                      "gpu, or a part of its name; the file is the same [the host's processors]");
+  command
+      ->add_option("--threads", options->generate.num_threads,
+                   "number of threads; 0: one per processor")
       ->capture_default_str();
   command
       ->add_option("-o,--output", options->output,
-                   "file (.raw, .nrrd), or a folder for a file FIELD_XxYxZ_TYPE.raw")
+                   "file (.raw, .nrrd), or folder for a file FIELD_XxYxZ_TYPE.raw")
       ->capture_default_str();
   command->callback([command, options] { run_generate(*command, *options); });
 }

@@ -186,8 +186,8 @@ void add_info(CLI::App &app) {
   command->add_flag("--json", options->json, "print JSON");
   command->add_flag(
       "--no-scan", options->no_scan,
-      "look at the header only: no value range, no checksum of the data, no check of what "
-      "a .zfp file says of its voxels");
+      "look only at the header: no value range, no checksum of the data, no check that a .zfp "
+      "file's trailer agrees with its voxels");
   add_volume_options(*command, options->volume);
   add_no_data_option(*command, options->no_data);
   command->callback([options] { run(*options); });

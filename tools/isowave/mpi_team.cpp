@@ -98,7 +98,7 @@ class HostWords {
 
   /// Words that each process has room for here.
   std::size_t capacity() const { return capacity_; }
-  /// Of the host's first process: for those of all.
+  /// Words of the host's first process, for the words of all.
   std::span<std::uint64_t> first() const { return segments_.front(); }
 
   /// Reduces words [begin, begin + count), no more than capacity(), part by part: what one process
@@ -162,10 +162,10 @@ class HostWords {
   // Containers often have but 64 MiB of shared memory.
   static constexpr std::size_t kHostWords = std::size_t{1} << 22;
   static constexpr std::size_t kMostWords = std::size_t{1} << 20;  ///< of each process
-  /// In place of a rank: all but the first, put together. The first says nothing of its own words.
+  /// Stands for a rank: all processes but the first, put together.
   static constexpr int kOthers = 0;
 
-  /// Of all processes but the first: each reduces its share of the parts, into the second's.
+  /// Called by all processes but the first: each reduces its share of the parts into the second's.
   void reduce_others(std::size_t count, Reduction how, const Wait &wait) {
     const std::size_t num_parts = (count + kPartWords - 1) / kPartWords;
     const auto share = [&](int number) {

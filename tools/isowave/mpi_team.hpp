@@ -8,14 +8,14 @@
 #include <string>
 
 #include "core/base/team.hpp"
-#include "core/bricks/compress_together.hpp"
+#include "core/zfp/shared_file.hpp"
 
 namespace isowave::core::tools {
 
-/// Of main(): MPI from its beginning to its end.
+/// MPI from its beginning to its end; main() has one.
 class MpiJob {
  public:
-  /// Where mpirun has started more than one process, joins them. All but rank 0 fall silent.
+  /// Joins the processes if mpirun has started more than one. All but rank 0 fall silent.
   MpiJob(int *argc, char ***argv);
   ~MpiJob();
   MpiJob(const MpiJob &) = delete;

@@ -67,8 +67,8 @@ void Outputs::write(const std::string &option, const fs::path &path) {
       users_.emplace(key_of(path), fmt::format("{} {}", option, path.string()));
   if (!is_new)
     throw Error("{} {}: it would take the place of {}", option, path.string(), user->second);
-  // Of many frames' files in a folder, the first shows whether there can be any; a file that is
-  // replaced, whether it may be.
+  // The first of many frames' files shows if the folder can be written to; an existing file, if it
+  // may be replaced.
   if (probed_.insert(folder).second || fs::exists(path, failure)) AtomicFile{path};
 }
 

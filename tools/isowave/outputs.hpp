@@ -20,9 +20,9 @@ class Outputs {
   /// written, or is a file that read() or write() was called with: by any name, also through
   /// symbolic and hard links.
   void write(const std::string &option, const std::filesystem::path &path);
-  /// A folder for files PREFIX*.png whose number nobody knows yet. It is made by make_folder()
-  /// where it is missing. After all read() and write(): throws Error also where one of those files
-  /// has such a name.
+  /// Announces a folder for files PREFIX*.png whose number is not known yet; make_folder() makes
+  /// the folder if it is missing. Call it after all read() and write(): throws Error also if one of
+  /// their files has such a name.
   void write_pictures(const std::string &option, const std::filesystem::path &folder,
                       const std::string &prefix);
   /// Has the program's OutputGroup make it.

@@ -57,7 +57,7 @@ std::optional<std::string> finish_output() {
          (errno != 0 ? fmt::format(": {}", std::strerror(errno)) : "");
 }
 
-/// Of a subcommand that is missing: CLI11 does not say that there is one of another name.
+/// The text for a missing subcommand. CLI11 does not say that an unknown one was given.
 std::string text_of(const CLI::RequiredError &error, const CLI::App &app) {
   const std::vector<std::string> unknown = app.remaining(true);
   if (unknown.empty() || app.get_subcommands([](const CLI::App *) { return true; }).empty())

@@ -97,7 +97,7 @@ RendererOptions to_renderer_options(const RendererFlags &flags, ImageSize size) 
   if (is_blocks) options.pipeline = blocks_pipeline(of_blocks);
   if (flags.speculation == "off") options.max_speculation = 1;
   // Measured: pipeline blocks needs twice the passes with it, and is no faster for decoding less
-  // (bench/README.md).
+  // (bench/h100.md).
   options.per_ray_speculation =
       flags.speculation == "per-ray" || (flags.speculation == "auto" && !is_blocks);
   options.solver = solver_from_string(flags.solver);

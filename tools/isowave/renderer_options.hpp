@@ -27,16 +27,16 @@ void add_normals_option(CLI::App &app, std::string &normals);
 /// --ambient N, FrameRequest::ambient_rays.
 void add_ambient_option(CLI::App &app, std::uint32_t &num_rays);
 
-/// Asks for levels of detail of a volume that is compressed now, if nobody said how many.
+/// Asks for levels of detail of a volume that is compressed now, if the user has not said how many.
 inline void want_levels(CompressionOptions &compression) {
   if (!says_levels(compression)) compression.levels = 0;
 }
 
-/// Throws Error on names that there are not, and on options without effect beside others.
+/// Throws Error on unknown names, and on options without effect beside others.
 void check_renderer_options(const CLI::App &app, const RendererFlags &flags);
 
-/// Of frames with levels of detail where flags.voxel_pixels is not 0. Throws Error on a solver,
-/// grouping or way to the closest hit that there is not.
+/// Options for frames with levels of detail if flags.voxel_pixels is not 0. Throws Error on an
+/// unknown solver, grouping or way to the closest hit.
 RendererOptions to_renderer_options(const RendererFlags &flags, ImageSize size);
 
 /// pipeline, speculation, max_speculation, cache_slots, solver, grouping, closest, group_size,

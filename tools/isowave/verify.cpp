@@ -178,7 +178,8 @@ void add_verify(CLI::App &app) {
   add_verify_frames_options(*command, options->frames);
   command->add_option(
       "--solver", options->solvers,
-      "linear, marmitt, analytic, bernstein; repeat it [suite: all; frames: the default one]");
+      "root finder: linear, marmitt, analytic or bernstein; repeat it [suite: all; frames: the "
+      "default one]");
   command->add_option("--rays", options->rays, "rays per case of the suite")
       ->check(CLI::Range(1u, 100'000'000u))
       ->capture_default_str();
@@ -188,9 +189,9 @@ void add_verify(CLI::App &app) {
                    "the device")
       ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1'000'000'000'000}))
       ->capture_default_str();
-  command->add_option("--seed", options->seed, "of the suite's fields and rays")
+  command->add_option("--seed", options->seed, "seed of the suite's fields and rays")
       ->capture_default_str();
-  command->add_option("--json", options->json, "write the results as JSON");
+  command->add_option("--json", options->json, "file for the results, as JSON");
   command->callback([command, options] { run_verify(*command, *options); });
 }
 

@@ -181,27 +181,25 @@ std::uint64_t verify_frames(const VerifyFramesOptions &options,
 }
 
 void add_verify_frames_options(CLI::App &command, VerifyFramesOptions &options) {
-  command.add_option("VOLUME", options.input, "judge frames of this volume instead of the suite");
+  command.add_option("VOLUME", options.input,
+                     "volume whose frames are judged, instead of the suite");
   add_volume_options(command, options.volume);
   add_frame_options(command, options.frame);
   command
       .add_option(
           "--oracle", options.oracles,
-          "who judges frames: roots (every root on the ray, certified), cells (Embree through the "
-          "dual cells) "
-          "or mesh (Embree and triangles); repeat it [all]")
+          "judge of frames: roots (every root on the ray, certified), cells (Embree through the "
+          "dual cells) or mesh (Embree and triangles); repeat it [all]")
       ->check(CLI::IsMember({"roots", "cells", "mesh"}))
       ->allow_extra_args(false);  // one name each time: VOLUME may follow
   command.add_option(
       "--max-surface-error", options.max_surface_error,
-      "judge what render --max-surface-error promises instead: each pixel's bound against "
-      "the volume before "
-      "compression");
+      "judge each pixel's bound of render --max-surface-error instead, against the volume before "
+      "compression [pixels]");
   command.add_option(
       "--device", options.device,
-      "who draws frames, or is tested for leaks beside the scalar reference: index, cpu, gpu, "
-      "or a part of its name "
-      "[frames: the scalar reference; leaks: as render]");
+      "device that draws frames, or is tested for leaks beside the scalar reference: index, cpu, "
+      "gpu, or a part of its name [frames: the scalar reference; leaks: as render]");
 }
 
 }  // namespace isowave::core::tools

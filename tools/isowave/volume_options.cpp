@@ -10,7 +10,6 @@
 #include "core/base/error.hpp"
 #include "core/base/text.hpp"
 #include "core/bricks/brick_volume.hpp"
-#include "core/bricks/compress_together.hpp"
 #include "core/io/raw_reader.hpp"
 #include "core/ocl/device.hpp"
 #include "core/platform/streams.hpp"
@@ -19,6 +18,7 @@
 #include "core/stages/zfp_encode.hpp"
 #include "core/zfp/describe_compression.hpp"
 #include "core/zfp/isovalue.hpp"
+#include "core/zfp/slabs.hpp"
 #include "core/zfp/zfp_accuracy.hpp"
 #include "tools/isowave/program.hpp"
 #include "tools/isowave/strict_options.hpp"
@@ -28,10 +28,11 @@ namespace isowave::core::tools {
 void add_volume_options(CLI::App &command, VolumeOptions &options) {
   command
       .add_option("--dims", options.dims,
-                  "voxels of a raw file whose name does not say: X Y Z, or N for a cube")
+                  "number of voxels of a raw file, unless its name says it: X Y Z, or N for a cube")
       ->expected(1, 3);
-  command.add_option("--type", options.type,
-                     "voxel type of a raw file: uint8, int8, ... float32, float64");
+  command.add_option(
+      "--type", options.type,
+      "voxel type of a raw file, unless its name says it: uint8, int8, ... float32, float64");
   command
       .add_option("--spacing", options.spacing, "world units between voxels: X Y Z or one for all")
       ->expected(1, 3);
@@ -57,9 +58,10 @@ RawOverrides to_overrides(const VolumeOptions &options) {
 
 CLI::Option *add_no_data_option(CLI::App &command, std::optional<double> &no_data) {
   return command
-      .add_option("--no-data", no_data,
-                  "voxels of this value have no data, as NaN voxels have none: no surface touches "
-                  "them. Compared in the volume's own type, after scaling; may be inf or -inf")
+      .add_option(
+          "--no-data", no_data,
+          "value of voxels without data, which no surface touches; NaN voxels have no data, "
+          "either. Compared in the volume's own type, after scaling; may be inf or -inf")
       ->check(any_number())
       ->type_name("NUMBER");
 }
@@ -67,21 +69,21 @@ CLI::Option *add_no_data_option(CLI::App &command, std::optional<double> &no_dat
 void add_compression_options(CLI::App &command, CompressionOptions &options) {
   CLI::Option *rate =
       command.add_option("--rate", options.rate,
-                         "compress to this many bits per voxel, 1 to 32 [as many as keep all that "
-                         "float32 holds: integers below 2^24 and float32 have no error]");
+                         "compress to this many bits per voxel, 1 to 32 [as many as float32 values "
+                         "need: integers below 2^24 and float32 have no error]");
   CLI::Option *tolerance = command.add_option(
       "--tolerance", options.tolerance,
-      "compress to as few bits as keep each voxel within this error of the input's");
+      "compress to as few bits as possible, with each voxel within this error of the input's");
   CLI::Option *relative = command.add_option("--tolerance-relative", options.relative_tolerance,
-                                             "the same, as a part of the range of values");
+                                             "as --tolerance, but a part of the range of values");
   CLI::Option *exact = command.add_flag(
       "--exact", options.exact,
-      "compress without any error, or refuse the volume if float32 does not hold its values");
+      "compress without any error; a volume whose values float32 does not hold is refused");
   CLI::Option *levels = command
                             .add_option("--levels", options.levels,
-                                        "levels of detail of a volume that is compressed, each of "
-                                        "half the voxels along each axis, "
-                                        "itself among them: a number, or all")
+                                        "number of levels of detail to make, or all: 1 is the "
+                                        "volume alone, each further level halves the voxels along "
+                                        "each axis")
                             ->transform(count_or_all())
                             ->type_name("N|all")
                             ->capture_default_str();

@@ -58,7 +58,7 @@ ARTICLE = {
         total_ms=1200,
     ),
 }
-# Of the whole article: means over its data sets. Memory, cache and blocks: BCMC's over ours.
+# The article's means over its data sets. Memory, cache and blocks: BCMC's over those of rays.
 FEWER_PASSES, LESS_TIME = 10, 4.8
 LESS_MEMORY, SMALLER_CACHE, FEWER_BLOCKS = 3.1, 4.8, 6.7
 DONE_BY_PASS_TWO, VISIBLE = 75, 1.3  # percent
@@ -214,7 +214,7 @@ def methods(row, kind, size=None):
 
 
 def of_rays(row, kind, speculation=True, cache="default"):
-    """Of those, the paper's way to look ahead, or the default's."""
+    """A method of rays with `global` or per-ray speculation, never with `scanned`."""
     return next(
         m
         for m in methods(row, kind)

@@ -60,7 +60,7 @@ def as_arguments(options):
 
 
 def voxels_of(field):
-    """Of a synthetic volume, by its name."""
+    """Number of voxels of a synthetic volume, by its name."""
     x, y, z = field.rsplit("_", 1)[1].split("x")
     return int(x) * int(y) * int(z)
 
@@ -170,6 +170,6 @@ class Run:
         return name
 
     def hide_folder(self):
-        """In the commands, where volumes lie is nobody's business."""
+        """Writes FOLDER for the folder of the volumes, which says nothing to others."""
         folder = str(self.options.volumes)
         self.commands = [command.replace(folder, "FOLDER") for command in self.commands]

@@ -1,5 +1,6 @@
 # Run when the package is installed: -D folder=<the package> -D zfp=<libzfp.so> -D nm=<nm>
-# -D patchelf=<patchelf>. Gives the package a libzfp of its own, whose names nobody else has.
+# -D patchelf=<patchelf>. Gives the package a libzfp of its own, whose names no other library
+# has.
 #
 # libcfitsio, which ParaView loads, exports stream_open, stream_close, stream_flush and
 # stream_size, as does libzfp. The dynamic linker takes the first that a process loaded, for

@@ -92,7 +92,7 @@ nb::dict statistics_dict(const isowave::FrameStatistics &statistics) {
   return result;
 }
 
-/// Of frame.hits: cells [rows][columns][3] and levels [rows][columns].
+/// Adds frame.hits as cells [rows][columns][3] and levels [rows][columns].
 void add_hits(const isowave::Frame &frame, nb::dict &result) {
   std::vector<Index3> cells;
   std::vector<std::uint32_t> levels;

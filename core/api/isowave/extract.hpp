@@ -18,7 +18,7 @@ namespace isowave {
 Mesh extract(const std::shared_ptr<Device> &device, const std::shared_ptr<const Volume> &volume,
              double isovalue, const ExtractOptions &options = {});
 
-/// The same to a file, as the host's extract_to_file().
+/// Extracts the isosurface to a file, as the host's extract_to_file().
 std::string extract_to_file(const std::shared_ptr<Device> &device,
                             const std::shared_ptr<const Volume> &volume, double isovalue,
                             const std::filesystem::path &path, const ExtractOptions &options = {});

@@ -1,6 +1,6 @@
 #pragma once
 // The part of isowave that needs no OpenCL. A library that was built with -DISOWAVE_OPENCL=OFF has
-// this part alone.
+// only this part.
 //
 //   auto volume = isowave::open_volume("head.nrrd");
 //   isowave::Renderer renderer = isowave::make_host_renderer(volume);

@@ -7,8 +7,7 @@
 //   isowave::Frame frame = renderer.render({.camera = renderer.camera(80), .isovalue = 80});
 //   isowave::save_png(frame, "head.png");
 //
-// What goes wrong is thrown as isowave::Error. Devices, volumes and renderers may be used from
-// several threads; see each.
+// Functions throw isowave::Error. Several threads may use devices, volumes and renderers; see each.
 
 #include "isowave/bricks.hpp"
 #include "isowave/device.hpp"

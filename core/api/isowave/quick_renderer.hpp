@@ -1,5 +1,5 @@
 #pragma once
-// Draws at once what a device's renderer will draw when its kernels are compiled.
+// Draws on the host until a device's kernels are compiled.
 
 #include <memory>
 
@@ -10,18 +10,18 @@
 
 namespace isowave {
 
-/// A renderer that draws on the host until a device's renderer is ready(), which is made in a
-/// thread of its own; from then on on the device. Returns at once. Meanwhile others that ask the
-/// device for anything wait. Keeps device and volume alive.
+/// Makes a renderer that draws on the host until a device's renderer is ready(), and then on the
+/// device. Returns at once: a thread of its own makes the device's renderer. Other renderers of the
+/// device wait meanwhile. Keeps device and volume alive.
 ///
-/// Until ready(), the volume is decoded on the host when a frame first needs it. A frame at work
-/// when the device becomes ready is begun anew there, and on_pass then sees its passes from the
+/// Until ready(), the host decodes the volume when a frame first needs it. If the device becomes
+/// ready during a frame, the device begins the frame anew, and on_pass sees its passes from the
 /// first on. If the host cannot draw a request, or the volume exceeds the host's memory limit,
-/// render() waits for the device. The renderer's destructor waits for the kernel that is being
-/// compiled, not for those behind it.
+/// render() waits for the device. The renderer's destructor waits only for the kernel that is being
+/// compiled.
 ///
-/// Throws  Error: no device, or no volume; the memory does not suffice; options out of range. What
-///         else goes wrong is thrown by the calls that need the device, each time
+/// Throws  Error: no device, or no volume; not enough memory; options out of range. Other errors of
+///         the device's renderer are thrown by each call that needs the device
 Renderer make_quick_renderer(std::shared_ptr<Device> device, std::shared_ptr<const Volume> volume,
                              const RendererOptions &options = {},
                              const HostRendererOptions &host_options = {});

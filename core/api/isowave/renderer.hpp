@@ -16,13 +16,13 @@ namespace isowave {
 class Device;
 struct DeviceInfo;
 
-/// What a renderer is made for. Its memory is taken when it is made; without a budget and
-/// cache_blocks, the cache grows between frames, should these need more blocks.
+/// What a renderer is made for. A renderer takes its memory when it is made. Without memory_budget
+/// and cache_blocks, the cache grows between frames if frames need more blocks.
 struct RendererOptions {
-  ImageSize largest{};              ///< picture: frames may have as many rays, in any shape
-  std::uint64_t memory_budget = 0;  ///< of device memory [bytes]; 0: three quarters of it
-  /// Decoded blocks of 4^3 voxels that are kept, 8 and more; 0: as many as the budget allows, or,
-  /// without one, as frames need.
+  ImageSize largest{};              ///< largest picture: frames may have as many rays, in any shape
+  std::uint64_t memory_budget = 0;  ///< bound on device memory [bytes]; 0: three quarters of it
+  /// Number of decoded blocks of 4^3 voxels that are kept, 8 and more. 0: as many as memory_budget
+  /// allows, or without a budget as many as frames need.
   std::uint32_t cache_blocks = 0;
   bool with_levels = false;       ///< frames may use levels of detail
   bool with_bounds = false;       ///< frames may ask for bounds and max_surface_error
@@ -30,15 +30,15 @@ struct RendererOptions {
   bool with_rays = false;         ///< frames may have ambient rays, and cast_rays() may be called
 };
 
-/// Turns requests into pictures of one volume. The constructor makes one that draws on a device;
-/// make_host_renderer(), make_quick_renderer() and make_team_renderer() make others, whose pictures
-/// have the same bits. May be used from several threads: frames are drawn one after the other.
+/// Turns requests into pictures of one volume. The constructor makes a renderer that draws on a
+/// device. make_host_renderer(), make_quick_renderer() and make_team_renderer() make renderers
+/// whose pictures have the same bits. Several threads may share a renderer: its frames take turns.
 class Renderer {
  public:
-  /// Brings the compressed volume to the device, or what of it is needed if it does not fit, and
-  /// has the kernels compiled. Keeps device and volume alive.
+  /// Uploads the compressed volume to the device, unless the volume does not fit, and compiles the
+  /// kernels. Keeps device and volume alive.
   ///
-  /// Throws  Error: the memory does not suffice (names what would), options out of range
+  /// Throws  Error: not enough memory (names how much would be enough), options out of range
   Renderer(std::shared_ptr<Device> device, std::shared_ptr<const Volume> volume,
            const RendererOptions &options = {});
   ~Renderer();
@@ -47,47 +47,48 @@ class Renderer {
 
   /// Draws a frame and waits for it. Decoded blocks are kept for further frames.
   ///
-  /// Throws  Error: a request that the renderer was not made for, a degenerate camera, a NaN; a
-  /// file
-  ///         that cannot be read. Further frames are drawn as if it had not been
+  /// Throws  Error: a request that the renderer was not made for, a degenerate camera, a NaN, a
+  ///         file that cannot be read. The renderer can draw further frames afterwards
   Frame render(const FrameRequest &request);
 
-  /// The first hit of each ray, in the finest level of detail: from a frame of one row, with depth
-  /// (in lengths of the ray's direction), normals, positions and hits. A device needs with_rays.
+  /// Finds the first hit of each ray in the finest level of detail. Returns a frame of one row with
+  /// depth (in lengths of the ray's direction), normals, positions and hits. A device needs
+  /// with_rays.
   ///
   /// Throws  Error: the isovalue is NaN; a ray is not finite, has no direction, or begins more than
-  ///         1e7 voxels away from the volume's origin; a hit is so many lengths of the direction
-  ///         away that float32 does not hold the depth; the renderer is a team's
+  ///         1e7 voxels away from the volume's origin; float32 does not hold a hit's depth, because
+  ///         the direction is too short; the renderer is a team's
   Frame cast_rays(std::span<const Ray> rays, double isovalue, Normals normals = Normals::kSmooth);
 
   /// A view from the front right and above in which the isosurface fills a picture of that size
-  /// (none: of the largest); the volume, if there is no surface.
+  /// (none: of the largest size). If there is no surface, the volume fills the picture.
   Camera camera(double isovalue, std::optional<ImageSize> size = {});
 
   /// Whether the renderer was made for such requests.
   bool can_draw(const FrameRequest &request) const;
 
-  /// Whether kernels are no longer being compiled: always, but for make_quick_renderer().
+  /// Whether the device can draw. Always true, except that a renderer of make_quick_renderer()
+  /// still compiles kernels at first.
   bool ready() const;
   /// Whether render() draws such a request without waiting until ready().
   bool ready_for(const FrameRequest &request) const;
   /// Waits until ready().
   ///
-  /// Throws  Error: what went wrong when the device's renderer was made
+  /// Throws  Error: the device's renderer could not be made
   void wait() const;
-  /// Compiles no more kernels after the one at work. Returns at once; afterwards, unless the
-  /// renderer was ready, calls that need the device throw Error.
+  /// Compiles no more kernels after the current one. Returns at once. Unless the renderer was
+  /// ready, calls that need the device then throw Error.
   void give_up();
 
-  const std::shared_ptr<Device> &device() const;        ///< null: on the host, or a team's
-  const std::shared_ptr<const Volume> &volume() const;  ///< null: a team's
+  const std::shared_ptr<Device> &device() const;        ///< null on the host, and for a team
+  const std::shared_ptr<const Volume> &volume() const;  ///< null for a team
   const DeviceInfo &device_info() const;                ///< of this process; empty on the host
-  const Grid &grid() const;                             ///< of the whole volume
+  const Grid &grid() const;                             ///< grid of the whole volume
   /// As Volume::notices() and Volume::isovalue_notice().
   const std::vector<std::string> &notices() const;
   std::string isovalue_notice(double isovalue) const;
-  /// Memory that the renderer holds [bytes]: of the device, 0 before ready(); on the host of value
-  /// ranges and decoded blocks, while a frame's rays take 36 each.
+  /// Memory that the renderer holds [bytes]: on the device, 0 before ready(); or on the host, for
+  /// value ranges and decoded blocks, without the 36 bytes a ray of the current frame.
   std::uint64_t memory_bytes() const;
   double setup_ms() const;  ///< wall clock of uploads, without compiling
 

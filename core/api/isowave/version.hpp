@@ -4,7 +4,7 @@
 
 namespace isowave {
 
-/// Of the library that is linked: "0.1.0".
+/// Version of the linked library, e.g. "0.1.0".
 std::string_view version();
 
 }  // namespace isowave

@@ -48,30 +48,31 @@ struct Region {
   std::array<std::uint32_t, 3> step{1, 1, 1};
 };
 
-/// How voxels are compressed: by one of rate, tolerance, relative_tolerance and exact. By default
-/// voxels keep all that float32 holds of them: integers below 2^24 and float32 have no error at
-/// all. Compression takes memory for the result and a few layers of voxels.
+/// How voxels are compressed: by at most one of rate, tolerance, relative_tolerance and exact. By
+/// default, voxels are kept as float32 holds them: integers below 2^24 and float32 have no error.
+/// Compression takes memory for the result and a few layers of voxels.
 struct Compression {
   std::optional<std::uint32_t> rate{};         ///< bits per voxel, 1 to 32
   std::optional<double> tolerance{};           ///< no voxel is off by more [voxel values]
   std::optional<double> relative_tolerance{};  ///< the same, as a part of the range of values
-  bool exact = false;          ///< as by default, but voxels that float32 does not hold are refused
-  bool measure_error = false;  ///< for Volume::max_voxel_error() also at a rate: decodes all
-  std::uint32_t levels = 1;    ///< of detail, the volume itself among them; 0: all it can have
-  std::optional<float> map_nan{};  ///< what replaces NaN and infinite voxels
-  /// Voxels of this value have no data, as NaN voxels have none: no surface touches them. It is
-  /// compared in the volume's own type. Infinite voxels are refused without one of these two.
+  bool exact = false;          ///< refuses voxels that float32 does not hold; else as by default
+  bool measure_error = false;  ///< decodes all, for Volume::max_voxel_error() at a rate, too
+  std::uint32_t levels = 1;    ///< levels of detail, with the volume itself; 0: all it can have
+  std::optional<float> map_nan{};  ///< value that replaces NaN and infinite voxels
+  /// Value of voxels without data, compared in the volume's own type. NaN voxels have no data,
+  /// either: no surface touches voxels without data. Infinite voxels are refused unless map_nan or
+  /// no_data is given.
   std::optional<double> no_data{};
   std::uint32_t num_threads = 0;  ///< 0: one per processor. The result is the same for any number
-  /// Called from the calling thread: what is done, and how much of it, 0 to 1.
+  /// Called from the calling thread: what compress() is doing, and how much of it is done, 0 to 1.
   std::function<void(std::string_view what, double done)> progress{};
 };
 
-/// What the name of a raw file does not say: `NAME_XxYxZ_TYPE.raw` or `.raw.gz` does.
+/// What the name of a raw file does not say. `NAME_XxYxZ_TYPE.raw` and `.raw.gz` say it.
 struct RawFile {
   std::optional<std::array<std::uint32_t, 3>> dims{};
   std::optional<VoxelType> type{};
-  std::optional<Vector3> spacing{};  ///< replaces that of any format
+  std::optional<Vector3> spacing{};  ///< replaces the spacing of a file of any format
 };
 
 /// A compressed volume in memory or in a file. It cannot be changed, so any number of renderers and
@@ -83,27 +84,27 @@ class Volume {
   Volume &operator=(const Volume &) = delete;
 
   const Grid &grid() const;
-  VoxelType source_type() const;  ///< before compression
-  /// [least, largest] voxel of the source; infinite where a file does not say.
+  VoxelType source_type() const;  ///< type of voxels before compression
+  /// [least, largest] voxel of the source; infinite if a file does not say.
   std::array<float, 2> value_range() const;
   /// How blocks are stored: "reversible" (all bits of float32), "whole numbers" (rounded to the
   /// source's integers), "fixed accuracy" or "fixed rate".
   std::string_view compression() const;
   double bits_per_voxel() const;
   std::uint64_t compressed_bytes() const;
-  /// Largest |decoded - source|, where it was measured.
+  /// Largest |decoded - source|, if it was measured.
   std::optional<double> max_voxel_error() const;
   /// A line for users if the source has no surface at this isovalue: it says the range of values,
   /// and whether errors of compression can make a surface. Else nothing.
   std::string isovalue_notice(double isovalue) const;
-  /// Lines for users, of how the header of the opened file was understood: units that were
-  /// converted, a qform that says otherwise than the sform. None for what is compressed already.
+  /// Lines for users that say how the header of the opened file was understood: units that were
+  /// converted, a qform that contradicts the sform. Empty if the file was compressed already.
   const std::vector<std::string> &notices() const;
-  /// The errors of voxels and levels, and value_range(), are those that a `.zfp` file states. The
-  /// source is not there to check them, so bounds of frames hold if the file's writer is right.
-  /// false: they were measured when this volume was compressed.
+  /// Whether a `.zfp` file states the errors of voxels and levels, and value_range(). They cannot
+  /// be checked without the source, so bounds of frames hold if the file's writer is right. false:
+  /// they were measured when this volume was compressed.
   bool errors_are_stated() const;
-  std::uint32_t num_levels() const;  ///< of detail, the volume itself among them
+  std::uint32_t num_levels() const;  ///< levels of detail, with the volume itself
   /// Whether float32 holds positions in the volume's box within 1/4096 of a voxel. If so, vertices
   /// of meshes and positions of hits are rounded to float32, and files of meshes have float32.
   bool float32_positions() const;
@@ -117,13 +118,13 @@ class Volume {
   ///
   /// Throws  Error: there is no such level
   std::vector<float> decode(std::uint32_t level = 0) const;
-  /// Decodes voxels of a level: [nz][ny][nx] of those in the region. Only blocks of 4^3 voxels that
-  /// have some of these are decoded, and only they are read where the volume stays in a file.
+  /// Decodes the voxels of a level in a region: [nz][ny][nx]. Only blocks of 4^3 voxels that have
+  /// some of these voxels are decoded, and read if the volume stays in a file.
   ///
   /// Throws  Error: there is no such level; a side of the region is empty, or ends outside
   std::vector<float> decode(std::uint32_t level, const Region &region) const;
   /// Decodes blocks that are spread over the volume, for histograms: about max_voxels voxels, the
-  /// same ones each time; all, where there are no more.
+  /// same ones each time; all voxels if there are no more.
   std::vector<float> sample(std::uint64_t max_voxels) const;
   /// Writes a `.zfp` file to a temporary name and renames it.
   ///
@@ -140,10 +141,11 @@ class Volume {
 
 /// Opens a volume.
 ///
-/// path         .zfp: stays in the file, which must not change, and is read when it is needed.
+/// path         .zfp: the volume stays in the file, which must not change, and is read when it is
+///              needed.
 ///              .raw, .raw.gz, .nrrd, .nhdr, .mha, .mhd, .nii, .nii.gz: compressed into memory.
 ///              generate:FIELD_XxYxZ_TYPE: a synthetic volume (`isowave generate --help`)
-/// compression  of what is not compressed yet; refused with a .zfp file
+/// compression  for a volume that is not compressed yet; refused with a .zfp file
 /// Throws       Error: no such file, a header that is not understood, a wrong size, NaN, a volume
 ///              that cannot be drawn
 std::shared_ptr<const Volume> open_volume(const std::filesystem::path &path,
@@ -165,25 +167,24 @@ using ReadLayers =
 /// at once: arrays in chunked stores, simulations.
 ///
 /// read     called for ascending layers, by one thread at a time, not always the calling one
-/// keep     If compression reads more than once (it does without a rate, but not float32 by
-///          default), layers that were read are kept in a temporary file (TMPDIR) of the size of
-///          the volume, and each is asked for once. Else layers are asked for again, from front to
-///          back.
+/// keep     Keeps layers that compression needs twice in a temporary file (TMPDIR) of the volume's
+///          size; read() is then called once for each layer. false: read() is called again, from
+///          front to back. At a rate, and with float32 by default, layers are needed once.
 /// Throws   Error: as above; what read() throws, as Error
 std::shared_ptr<const Volume> compress(const ReadLayers &read, VoxelType type, const Grid &grid,
                                        const Compression &compression = {}, bool keep = true);
 
-/// The same, straight into a `.zfp` file, which is then opened: only a few layers of voxels are in
-/// memory, and with levels of detail up to 9 bytes for each block of 4^3 voxels.
+/// The same, straight into a `.zfp` file, which is then opened. Memory holds a few layers of
+/// voxels, and with levels of detail up to 9 bytes for each block of 4^3 voxels.
 ///
-/// path    ends in .zfp; written under a temporary name that is renamed
+/// path    ends in .zfp; the file is written under a temporary name, and renamed
 /// Throws  Error: as above; the file cannot be written
 std::shared_ptr<const Volume> compress_to_file(const ReadLayers &read, VoxelType type,
                                                const Grid &grid, const std::filesystem::path &path,
                                                const Compression &compression = {},
                                                bool keep = true);
 
-/// Throws  Error unless a number of voxels is that of the grid
+/// Throws  Error unless the grid has so many voxels
 void check_num_voxels(std::uint64_t num_voxels, const Grid &grid);
 
 /// The type of voxels T.

@@ -7,8 +7,8 @@
     image.save("head.png")  # image.rgba, .depth, .normals, .position are numpy arrays
     isowave.view(volume)  # in a browser or notebook
 
-What describes an array's axes is in the order of the array, (z, y, x): shape, spacing, origin,
-cells. Vectors in world space are (x, y, z): cameras, normals, positions.
+Shape, spacing, origin and cells are in the order of an array's axes, (z, y, x). Vectors in world
+space are (x, y, z): cameras, normals, positions.
 """
 
 from isowave import _loader

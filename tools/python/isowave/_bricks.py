@@ -1,4 +1,4 @@
-"""A volume that the processes of mpirun draw together, each a brick of it."""
+"""Draws a volume with the processes of mpirun; each process draws a brick of the volume."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Result = TypeVar("Result")
 
 
 class Processes:
-    """A communicator of mpi4py's as the compiled part calls it."""
+    """A communicator of mpi4py, as the compiled part calls it."""
 
     def __init__(self, comm: Any) -> None:
         from mpi4py import MPI
@@ -72,33 +72,32 @@ class BrickRenderer(Placed[_core.Renderer]):
     """Draws a volume that may be larger than one machine: each process has a brick of it.
 
     The pictures have the bits of Renderer's. All processes of the communicator make the same calls
-    in the same order; what goes wrong at one is raised at all. Needs mpi4py.
+    in the same order. An error of one process is raised in all. Needs mpi4py.
 
     Parameters
     ----------
     path
-        A .zfp file, of which each process reads its blocks alone, or another volume, as
-        isowave.open(): each reads its layers, and compresses its brick.
+        A volume, as for isowave.open(). Each process reads only its blocks of a .zfp file; of other
+        files it reads its layers, and compresses its brick.
     comm
-        A communicator of mpi4py's: MPI.COMM_WORLD. Of a machine's processes, each takes one of its
-        devices.
+        A communicator of mpi4py, e.g. MPI.COMM_WORLD. The processes of a machine share its devices.
     device, size, samples, memory_budget, cache_blocks, rays
-        As Renderer's, of each process; devices with commas between are taken in turn.
+        As Renderer's, for each process. Several devices, with commas, are taken in turn.
     levels
         Frames may use the levels of detail that are in the .zfp file.
     bounds
-        Frames may ask for `max_error` and bounds. A volume that is compressed here has its error
-        measured then.
+        Frames may ask for `max_error` and bounds. If the volume is compressed here, its error is
+        then measured.
     bricks
-        How many along x, y and z; None: as fits.
+        Number of bricks along x, y and z; None: bricks of equal size.
     tolerance, relative_tolerance, rate, exact, map_nan, no_data
         As isowave.open()'s.
 
     Raises
     ------
     Error
-        At all processes: what Renderer raises; different arguments or volumes; more processes than
-        can have bricks.
+        In all processes: what Renderer raises; different arguments or volumes; more processes than
+        there can be bricks.
     """
 
     def __init__(
@@ -144,7 +143,7 @@ class BrickRenderer(Placed[_core.Renderer]):
 
     @property
     def device(self) -> dict[str, Any]:
-        """This process's, as Renderer.device."""
+        """This process's device, as Renderer.device."""
         return self._core.device
 
     def camera(self, isovalue: float, size: tuple[int, int] | None = None) -> Camera:
@@ -165,20 +164,20 @@ class BrickRenderer(Placed[_core.Renderer]):
     ) -> Image | None:
         """Draws a frame; arguments as Renderer.render(), without positions, time_budget, on_pass.
 
-        `max_error` and the output "bounds" need bounds=True; the choice of detail, and the bounds,
-        are those of one Renderer.
+        `max_error` and the output "bounds" need bounds=True. One Renderer would choose the same
+        detail, and find the same bounds.
 
         Returns
         -------
         Image
-            At rank 0: of the whole volume. Its statistics are rank 0's, but for hits.
+            At rank 0: the picture of the whole volume. Its statistics are rank 0's, except hits.
         None
-            At the others.
+            At the other ranks.
 
         Raises
         ------
         Error, TypeError, ValueError
-            At all processes, as Renderer.render(); and if they ask for different frames.
+            In all processes, as Renderer.render(); also if processes ask for different frames.
         """
 
         def ask() -> Request:

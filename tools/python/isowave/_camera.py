@@ -14,18 +14,18 @@ from isowave._placed import Placed
 
 @dataclasses.dataclass(frozen=True)
 class Camera:
-    """A camera in world space, a pinhole or of parallel projection; vectors are (x, y, z)."""
+    """A camera in world space, a pinhole or in parallel projection; vectors are (x, y, z)."""
 
     eye: tuple[float, float, float]
     at: tuple[float, float, float]
     up: tuple[float, float, float] = (0.0, 1.0, 0.0)
     fovy: float = 60.0  #: pinhole: angle between the picture's lower and upper edge [degrees]
-    #: Parallel (orthographic) projection: height of the picture [world units]. Depth is the
-    #: distance from the eye's plane.
+    #: Height of the picture in parallel (orthographic) projection [world units]; None: a pinhole.
+    #: Depth is then the distance from the eye's plane.
     parallel_height: float | None = None
 
     def pixel_size(self, height: int, distance: float) -> float:
-        """Height of a pixel, of `height` in a picture, at a distance [world units]."""
+        """Height of a pixel at a distance, in a picture of `height` pixels [world units]."""
         if self.parallel_height is not None:
             return self.parallel_height / height
         return distance * 2 * math.tan(math.radians(self.fovy) / 2) / height

@@ -19,7 +19,7 @@ def flag(name: str, value: Any) -> bool:
 
 
 def whole(name: str, value: Any, largest: int = 2**32 - 1) -> int:
-    """From 0 on."""
+    """A whole number from 0 to `largest`."""
     try:
         if isinstance(value, (bool, np.bool_)):
             raise TypeError

@@ -1,4 +1,4 @@
-"""Arrays and files of voxels to volumes."""
+"""Makes volumes from arrays and files of voxels."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from isowave._arrays import ArraySource, as_source
 from isowave._checked import flag, number, reversed_axes, whole
 from isowave._volume import Volume, warn_of_file
 
-#: Called with what is done ("compressing") and how much of it, 0 to 1.
+#: Called with a step's name ("compressing") and how much of the step is done, 0 to 1.
 Progress = Callable[[str, float], object]
 
 SUPPORTED_TYPES = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64")
@@ -51,7 +51,7 @@ def compression_options(
         "map_nan": None if map_nan is None else number("map_nan", map_nan),
         "no_data": None if no_data is None else number("no_data", no_data),
         "num_threads": whole("num_threads", num_threads),
-        # If nothing bounds the error, it is measured: people ask.
+        # If nothing bounds the error, it is measured: users ask for it.
         "measure_error": not exact and tolerance is None and relative_tolerance is None,
     }
 
@@ -76,7 +76,7 @@ class TqdmProgress:
 
 
 def make_progress(progress: bool | Progress | None) -> Progress | None:
-    """None: a bar on a terminal or in a notebook, if tqdm is installed."""
+    """The function to call. progress=None: a bar on a terminal or in a notebook, with tqdm."""
     if callable(progress):
         return progress
     if progress is not None:
@@ -93,7 +93,7 @@ def make_progress(progress: bool | Progress | None) -> Progress | None:
 
 @contextlib.contextmanager
 def shown(progress: bool | Progress | None) -> Iterator[Progress | None]:
-    """The function that hears of progress; a bar is closed at the end."""
+    """The function to call with progress; closes its bar at the end."""
     told = make_progress(progress)
     try:
         yield told
@@ -123,8 +123,8 @@ def compress(
     """Compresses a three-dimensional array into memory, or into a file.
 
     Arrays in chunked stores (dask, zarr, h5py, tensorstore, and xarray of these) are read a few
-    layers at a time, each chunk once; meanwhile a temporary file of the array's size keeps them,
-    unless voxels are float32 and nothing is given, or a rate is.
+    layers at a time, each chunk once. A temporary file of the array's size keeps layers that are
+    needed twice: none at a rate, and none of float32 by default.
 
     Parameters
     ----------
@@ -132,38 +132,38 @@ def compress(
         Voxels, axes (z, y, x): numpy and what converts to it, memoryview, xarray, dask, zarr, h5py,
         tensorstore, SimpleITK, itk, nibabel, pyvista.ImageData.
     tolerance
-        No voxel is off by more [voxel values].
+        Largest error of a voxel [voxel values].
     relative_tolerance
-        The same, as a part of the range of values.
+        Largest error of a voxel, as a part of the range of values.
     rate
         Bits per voxel, 1 to 32.
     exact
         Refuse voxels that float32 does not hold. Without tolerance, relative_tolerance and rate,
         voxels keep all that float32 holds: integers below 2^24 and float32 have no error.
     spacing, origin
-        World units between voxels, and position of voxel (0, 0, 0); each (z, y, x). None: as the
-        array says itself (xarray, SimpleITK...), else 1 and 0.
+        World units between voxels, and position of voxel (0, 0, 0); each (z, y, x). None: what the
+        array says (xarray, SimpleITK...), else 1 and 0.
     direction
         3 x 3; column a is the unit world direction (x, y, z) of index axis a, in the order x, y, z.
     levels
-        Levels of detail, the volume itself among them; 0: all that it can have.
+        Number of levels of detail, with the volume itself; 0: all that it can have.
     map_nan
-        Replaces NaN and infinite voxels.
+        Value that replaces NaN and infinite voxels.
     no_data
-        Voxels of this value have no data, as NaN voxels have none: no surface touches them. It is
-        compared in the array's own type, and may be infinite; other infinite voxels are refused.
-        If None, what the array says itself: the attributes _FillValue or missing_value of xarray
-        and h5py, the fill value of zarr, h5py and tensorstore unless it is 0.
+        Value of voxels without data, which no surface touches; NaN voxels have no data, either.
+        no_data is compared in the array's own type, and may be infinite. Other infinite voxels are
+        refused. None: what the array says, by the attribute _FillValue or missing_value of xarray
+        and h5py, or the fill value of zarr, h5py and tensorstore unless it is 0.
     fill_value
-        Replaces masked values of masked arrays; if None, these have no data.
+        Value that replaces masked values of masked arrays. None: masked voxels have no data.
     path
-        A .zfp file that the volume is written to, layer by layer, and opened from: then the result
-        need not fit into memory. None: into memory.
+        A .zfp file that the volume is written to, layer by layer, and opened from, so that the
+        result need not fit into memory. None: into memory.
     progress
         True for a bar (needs tqdm), False for none, or a function of (what, done), done from 0 to
         1. None: a bar on a terminal or in a notebook, if tqdm is installed.
     num_threads
-        0: one per processor. The result is the same for any number.
+        Number of threads; 0: one per processor. The result is the same for any number.
 
     Raises
     ------
@@ -202,7 +202,7 @@ def compressed(
 
 
 def is_plain(array: Any) -> bool:
-    """Whether the compiled part can read its memory as it is."""
+    """Whether the compiled part can read the array's memory as it is."""
     return (
         type(array) is np.ndarray
         and array.flags.c_contiguous
@@ -229,12 +229,12 @@ def open(  # noqa: A001: as gzip.open, h5py.File's habit
 ) -> Volume:
     """Opens a volume.
 
-    A ``.zfp`` file stays where it is and is read when it is needed; it must not change. Others are
-    compressed into memory as compress() does: ``.raw`` and ``.raw.gz`` (named
-    ``NAME_XxYxZ_TYPE.raw``, or with shape (z, y, x) and dtype), ``.nrrd``, ``.nhdr``, ``.mha``,
-    ``.mhd``, ``.nii``, ``.nii.gz``, and ``generate:FIELD_XxYxZ_TYPE``.
+    A ``.zfp`` file is read when it is needed; it must not change. Other volumes are compressed into
+    memory, with the options of compress(): ``.raw`` and ``.raw.gz`` (named ``NAME_XxYxZ_TYPE.raw``,
+    or with shape (z, y, x) and dtype), ``.nrrd``, ``.nhdr``, ``.mha``, ``.mhd``, ``.nii``,
+    ``.nii.gz``, and ``generate:FIELD_XxYxZ_TYPE``.
 
-    spacing, (z, y, x), replaces that of the file.
+    spacing, (z, y, x), replaces the file's spacing.
 
     Raises
     ------

@@ -31,8 +31,8 @@ class Image:
     """(rows, columns, 3), world space; nan: no surface. float64 if float32 would lose more than
     1/4096 voxel, as it does far from the origin."""
     bounds: npt.NDArray[np.float32] | None
-    """How far the surface is from that of the volume before compression, at most [pixels]; inf:
-    nothing is certain. They hold if the volume's errors do, which a file may state wrongly:
+    """Largest possible distance to the surface of the volume before compression [pixels]; inf:
+    nothing is certain. Bounds hold if the volume's errors do, which a file may state wrongly:
     `statistics["errors_are_stated"]`, as `Volume.errors_are_stated`."""
 
     def __init__(self, frame: dict[str, Any], request: Request) -> None:
@@ -42,7 +42,7 @@ class Image:
         self.normals = frame.get("normals")
         self.position = frame.get("positions")
         self.bounds = frame.get("bounds")
-        #: What drawing took: passes, rays, hits, decoded_blocks, total_ms and so on.
+        #: Counts and times of the frame: passes, rays, hits, decoded_blocks, total_ms and so on.
         self.statistics: dict[str, Any] = frame["statistics"]
         self.camera = request.camera
         self.isovalue = request.isovalue
@@ -58,7 +58,7 @@ class Image:
     def rgba(self) -> npt.NDArray[np.uint8]:
         """(height, width, 4); alpha is the part of a pixel that the surface covers.
 
-        Colours are the surface's alone, without the background. Without depth, all is opaque.
+        Colours are the surface's, without the background. Without depth, all pixels are opaque.
         """
         rgb = self._rgb()
         if self.depth is None:
@@ -88,9 +88,9 @@ class Image:
         return _core.encode_png(self._rgb())
 
     def save(self, path: str | os.PathLike[str], *, alpha: bool = False) -> None:
-        """Writes a .png file; whole, or not at all.
+        """Writes a .png file, whole or not at all.
 
-        alpha: writes `rgba` in place of `rgb`; pixels without surface are transparent.
+        alpha: writes `rgba` instead of `rgb`; pixels without surface are transparent.
         """
         _core.save_png(self.rgba if flag("alpha", alpha) else self._rgb(), os.fsdecode(path))
 

@@ -1,4 +1,4 @@
-"""Compressed voxels as arrays, a volume's and its levels of detail: indexing decodes."""
+"""Arrays of the voxels of a volume and its levels of detail, which indexing decodes."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ Same = TypeVar("Same", bound="Voxels")
 class Level:
     """The voxels of a level of detail, (z, y, x), as an array that indexing decodes.
 
-    Made by Volume.levels. Indexing takes what numpy takes, and gives numpy arrays of float32 (a
-    number, if all three indices are integers). Of a file, only the blocks of 4 x 4 x 4 voxels
-    that hold what is asked for are read and decoded; lists and arrays of indices decode what lies
-    between the least and the largest, too. numpy.asarray(level) decodes everything;
-    dask.array.from_array(level, chunks=...) decodes chunks when they are computed: with sides that
-    are multiples of 4, no block twice.
+    Volume.levels makes them. Indexing takes what numpy takes, and gives numpy arrays of float32 (a
+    number, if all three indices are integers). Only the blocks of 4 x 4 x 4 voxels that hold what
+    is asked for are read from a file, and decoded. Lists and arrays of indices also decode the
+    voxels between the least and the largest index. numpy.asarray(level) decodes everything.
+    dask.array.from_array(level, chunks=...) decodes chunks when they are computed; if the sides of
+    chunks are multiples of 4, no block is decoded twice.
     """
 
     ndim = 3
@@ -49,13 +49,13 @@ class Level:
 
     @property
     def size(self) -> int:
-        """Voxels."""
+        """Number of voxels."""
         nz, ny, nx = self._shape
         return nz * ny * nx
 
     @property
     def nbytes(self) -> int:
-        """When all is decoded."""
+        """Size of all voxels when they are decoded [bytes]."""
         return self.size * self.dtype.itemsize
 
     def __len__(self) -> int:
@@ -101,7 +101,7 @@ class Voxels(Placed[_core.Volume]):
     """A volume's voxels: an array of float32, (z, y, x), that indexing decodes."""
 
     ndim = 3
-    dtype = Level.dtype  # of what indexing gives
+    dtype = Level.dtype  # type of what indexing gives
 
     def __init__(self, core: _core.Volume) -> None:
         self._core = core
@@ -109,7 +109,7 @@ class Voxels(Placed[_core.Volume]):
 
     @property
     def size(self) -> int:
-        """Voxels."""
+        """Number of voxels."""
         return self.levels[0].size
 
     @property
@@ -145,25 +145,24 @@ class Voxels(Placed[_core.Volume]):
 
     @property
     def errors_are_stated(self) -> bool:
-        """Whether errors and `value_range` are those that a .zfp file states.
+        """Whether a .zfp file states the errors and `value_range`.
 
-        The source is not there to check them: bounds of images hold if the file's writer is right.
-        False: they were measured when this volume was compressed.
+        They cannot be checked without the source, so bounds of images hold if the file's writer is
+        right. False: they were measured when this volume was compressed.
         """
         return self._core.errors_are_stated
 
     def isovalue_notice(self, isovalue: float) -> str:
-        """The warning that drawing this isovalue gives if it is outside the source's values, or
-        ""."""
+        """The warning of an isovalue outside the source's values, or "" for other isovalues."""
         return self._core.isovalue_notice(number("isovalue", isovalue))
 
     @property
     def num_levels(self) -> int:
-        """Levels of detail, the volume itself among them."""
+        """Number of levels of detail, with the volume itself."""
         return self._core.num_levels
 
     def level_shape(self, level: int) -> tuple[int, int, int]:
-        """Voxels of a level along (z, y, x). Voxel k of it lies at voxel 2^level k of the volume.
+        """Voxels of a level along (z, y, x). Its voxel k lies at voxel 2^level k of the volume.
 
         Sides are halved, and one is added: a level may end up to a voxel of its own behind the
         volume.
@@ -189,7 +188,7 @@ class Voxels(Placed[_core.Volume]):
         Parameters
         ----------
         level
-            Each has half the voxels of the last along each axis.
+            Level of detail; each has half the voxels of the last along each axis.
         region
             Key that would index an array of the level: numpy.s_[10:20, :, 5]. Only the blocks
             of 4 x 4 x 4 voxels that hold these voxels are decoded.
@@ -219,7 +218,7 @@ class Voxels(Placed[_core.Volume]):
         return self.levels[0].__array__(dtype, copy)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes a .zfp file, which open() and the program read; whole, or not at all."""
+        """Writes a .zfp file, which open() and the program read, whole or not at all."""
         self._core.save(os.fsdecode(path))
 
     def __copy__(self: Same) -> Same:

@@ -17,8 +17,8 @@ from isowave import _core
 class Mesh:
     """Triangles that share their vertices, as Volume.extract gives them.
 
-    Each edge of a triangle belongs to another one, too, but for those in the volume's border. No
-    triangle is without area, unless vertices were asked for exactly.
+    Each edge belongs to two triangles, except in the volume's border and beside voxels without
+    data. Every triangle has an area, unless vertices="exact" was asked for.
     """
 
     #: float32 (n, 3): world space, (x, y, z). float64 if float32 would lose more than 1/4096 voxel,
@@ -30,11 +30,11 @@ class Mesh:
     normals: npt.NDArray[np.float32] | None
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes a .ply, .stl, .obj, .vtp, .gltf or .glb file; whole, or not at all.
+        """Writes a .ply, .stl, .obj, .vtp, .gltf or .glb file, whole or not at all.
 
-        Vertices that float32 does not hold are float64 in .ply, .obj and .vtp. In the others they
-        have an offset: a node's translation in glTF. STL's header says what to add, and so does a
-        RuntimeWarning.
+        Vertices that float32 does not hold are float64 in .ply, .obj and .vtp. In glTF they are
+        relative to a node's translation. In STL they have an offset, which the file's header and a
+        RuntimeWarning name.
         """
         notice = _core.save_mesh(self.vertices, self.faces, self.normals, os.fsdecode(path))
         if notice:

@@ -20,7 +20,7 @@ from isowave._image import Image
 from isowave._levels import Voxels
 from isowave._request import ALL_OUTPUTS, Color, Progress, Request, normals_of
 
-#: Arguments of Renderer that let frames ask for more.
+#: Arguments of Renderer that allow more requests.
 CAPABILITIES = ("levels", "bounds", "time_budget", "rays")
 
 
@@ -57,7 +57,7 @@ def warn_of_isovalue(core: _core.Volume | _core.Renderer, isovalue: float) -> No
 
 
 def draw(renderer: _core.Renderer, request: Request, interrupts: bool = True) -> dict[str, Any]:
-    """The frame's arrays. interrupts: Ctrl-C is looked for after each pass."""
+    """Draws a frame, and returns its arrays. interrupts: looks for Ctrl-C after each pass."""
     on_pass = request.on_pass
 
     def callback(view: _core.PassView) -> bool:
@@ -71,7 +71,7 @@ def draw(renderer: _core.Renderer, request: Request, interrupts: bool = True) ->
 
 
 def positions_of(volume: Voxels, positions: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
-    """World positions in float32, if that holds them."""
+    """World positions, as float32 if that holds them."""
     return positions.astype(np.float32) if volume._core.float32_positions else positions
 
 
@@ -85,23 +85,23 @@ class Renderer:
     device
         "gpu", "cpu", an index, or a part of a name; None: $ISOWAVE_DEVICE, else the first GPU.
     size, samples
-        Largest picture (width, height), and rays of each of its pixels along each axis: frames may
-        have as many rays, in any shape.
+        Largest picture (width, height), and rays per pixel along each axis: frames may have as many
+        rays, in any shape.
     memory_budget
-        Most device memory to take [bytes]; None: three quarters of it. With a budget all is taken
-        at once; without, the cache begins small, and grows between frames.
+        Most device memory to take [bytes]; None: three quarters of it. With a budget, the renderer
+        takes all of it at once. Without, the cache begins small, and grows between frames.
     cache_blocks
-        Decoded blocks of 4^3 voxels that are kept, 8 and more; 0: as many as the budget allows, or,
-        without one, as frames need.
+        Number of decoded blocks of 4^3 voxels that are kept, 8 and more. 0: as many as the budget
+        allows, or without a budget as many as frames need.
     levels, bounds, time_budget, rays
-        Whether frames may use levels of detail, ask for `max_error` and bounds, have a
-        `time_budget`; whether they may have `ambient` rays, and cast_rays() may be called.
+        Whether frames may use levels of detail; ask for `max_error` and bounds; have a
+        `time_budget`; have `ambient` rays, and cast_rays() may be called.
     profiling
-        Measures stages, for statistics["stage_ms"]; each pass is waited for.
+        Measures stages, for statistics["stage_ms"]. The host then waits for each pass.
     quick
-        Returns at once: the device's renderer is made in a thread of its own, which may take half a
-        minute if a driver compiles kernels. Until it is ready, the host draws, with the same
-        bits; volumes that are too large for that, and what the host cannot draw (levels, bounds,
+        Returns at once: a thread makes the device's renderer, which may take half a minute if a
+        driver compiles kernels. Until the renderer is ready, the host draws the same bits. Volumes
+        that are too large for the host, and requests that it cannot draw (levels, bounds,
         time_budget), wait for the device.
     """
 
@@ -140,8 +140,8 @@ class Renderer:
 
     @property
     def device(self) -> dict[str, Any]:
-        """As an entry of isowave.devices(), and notice: what the device computes otherwise than the
-        host, so that pictures may differ from other devices' in last bits; "" if nothing."""
+        """As an entry of isowave.devices(), and notice: a line that names operations whose results
+        differ from the host's, or "". Pictures of such a device may differ in last bits."""
         return self._core.device
 
     @property
@@ -151,7 +151,7 @@ class Renderer:
 
     @property
     def ready(self) -> bool:
-        """Whether the device draws; False while the host does (quick)."""
+        """Whether the device draws; False while the host draws (quick)."""
         return self._core.ready
 
     def wait(self) -> None:
@@ -165,7 +165,7 @@ class Renderer:
         return Camera(*self._core.camera(number("isovalue", isovalue), *picture_size))
 
     def _check_turn(self) -> None:
-        """Raises Error in the loop over passes(): its frame has the renderer until it ends."""
+        """Raises Error in the loop over passes(), whose frame keeps the renderer until it ends."""
         if self._iterating == threading.get_ident():
             raise _core.Error("the renderer is at work for passes(): end that, or make another one")
 
@@ -187,7 +187,7 @@ class Renderer:
         ambient: int = 0,
         on_pass: Callable[[Progress], bool | None] | None = None,
     ) -> Image:
-        """Draws a frame. Decoded blocks are kept for the next.
+        """Draws a frame. Decoded blocks are kept for the next frame.
 
         Parameters
         ----------
@@ -198,34 +198,35 @@ class Renderer:
         size
             Width and height [pixels]; None: the renderer's largest.
         samples
-            Rays of a pixel along each axis, 1 to 8; colours are their mean.
+            Rays per pixel along each axis, 1 to 8; colours are their mean.
         color, background
             Colours of the surface and behind it: "#rrggbb", or red, green, blue from 0 to 1.
         normals
-            "smooth": by central differences; "cell": of the trilinear field itself, which jump from
-            cell to cell. They light the picture.
+            Normals that light the picture. "smooth": central differences; "cell": gradients of the
+            trilinear field itself, which jump from cell to cell.
         outputs
             Names of the arrays to bring back: "rgb", "depth", "normals", "position", "bounds".
         max_error
-            Chooses the detail such that most pixels are within so many pixels of the surface of the
-            volume before compression. Needs a renderer made with bounds=True.
+            Largest distance between the drawn surface and that of the volume before compression
+            [pixels]. The detail is chosen so that most pixels keep it. Needs bounds=True.
         voxel_pixels
-            Voxels of a coarser level may be so many pixels apart; 0: full detail.
+            Largest distance between voxels of a coarser level of detail [pixels]; 0: full detail.
+            Needs levels=True.
         voxel_error
-            Decoded voxels may be off by so much from the compressed ones.
+            Largest difference of decoded voxels from the compressed ones [voxel values].
         time_budget
-            Draws what can be drawn in so many seconds. Needs time_budget=True.
+            Draws the best picture possible in so many seconds. Needs time_budget=True.
         ambient
-            Rays of each hit, up to 255, that find out how much of the sky it sees, which makes
-            depth visible: 16 and more look smooth. Each takes about as long as the frame without.
-            Needs rays=True.
+            Rays from each hit, up to 255, that find out how much of the sky it sees, which shows
+            depth. 16 and more look smooth. Each takes about as long as a frame without any. Needs
+            rays=True.
         on_pass
-            Called after each pass with the picture so far; False from it stops the frame.
+            Called after each pass with the picture so far. If it returns False, the frame stops.
 
         Raises
         ------
         Error
-            A request that the renderer was not made for, in one line. The next is not affected.
+            A request that the renderer was not made for, in one line. Later frames can be drawn.
         """
         return self.draw(
             Request(
@@ -253,7 +254,7 @@ class Renderer:
             if not self._can[option]:
                 raise _core.Error(f"{argument} needs a renderer that was made with {option}=True")
         request = self._completed(request)
-        # On a GPU, frames end sooner than a person presses Ctrl-C, and looking for it after each
+        # On a GPU, frames end before a person can press Ctrl-C, and looking for Ctrl-C after each
         # pass would cost time.
         interrupts = self.device["type"] != "gpu"
         warn_of_isovalue(self._core, request.isovalue)
@@ -270,7 +271,7 @@ class Renderer:
     def cast_rays(
         self, rays: npt.ArrayLike, isovalue: float, *, normals: str = "smooth"
     ) -> dict[str, npt.NDArray[Any]]:
-        """As Volume.cast_rays(), on the device, from compressed blocks: needs rays=True."""
+        """As Volume.cast_rays(), on the device, through compressed blocks. Needs rays=True."""
         self._check_turn()
         if not self._can["rays"]:
             raise _core.Error("cast_rays needs a renderer that was made with rays=True")
@@ -298,10 +299,10 @@ class Renderer:
         return f"<isowave.Renderer {width} x {height}, {self.device['name']}{state}>"
 
     def passes(self, isovalue: float, **more: Any) -> Iterator[Image]:
-        """The picture after each pass, the last one finished; arguments as render().
+        """Yields the picture after each pass, and the finished one last; arguments as render().
 
-        Pictures before the last have rgb alone. The frame waits until the next picture is asked
-        for, and ends when the iterator is closed.
+        Pictures before the last have only rgb. The frame waits until the next picture is asked for,
+        and ends when the iterator is closed.
         """
         pictures: queue.Queue[Image | BaseException | None] = queue.Queue(maxsize=1)
         closed = threading.Event()
@@ -351,7 +352,7 @@ class Renderer:
 
 
 def host_renderer(volume: Voxels) -> Renderer:
-    """A Renderer that draws on the host, full detail, in a quarter of its memory at most.
+    """Makes a Renderer that draws on the host, in full detail, in a quarter of its memory at most.
 
     Raises
     ------

@@ -15,7 +15,7 @@ VARIABLES = ("ISOWAVE_DEVICE", "OCL_ICD_VENDORS", "OCL_ICD_FILENAMES", "POCL_CAC
 
 
 def devices() -> list[dict[str, Any]]:
-    """The OpenCL devices of this machine, in the loader's order; none where there is no driver.
+    """The OpenCL devices of this machine, in the loader's order; none if there is no driver.
 
     Each is a dict of index, name, vendor, platform, driver, type ("gpu", "cpu", "accelerator",
     "other") and memory_bytes. `device=` of other functions takes an index, a type, or a part of a

@@ -1,4 +1,4 @@
-"""What a frame is asked for: one class, checked in one place, handed over in one place."""
+"""Requests of frames: one class, checked in one place, handed over in one place."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ KNOWN_OUTPUTS = (*ALL_OUTPUTS, "bounds")
 
 
 class Progress:
-    """The picture so far, for on_pass; only until that returns."""
+    """The picture so far, for on_pass, and only until on_pass returns."""
 
     def __init__(self, view: _core.PassView) -> None:
         self._view = view
@@ -31,18 +31,18 @@ class Progress:
 
     @property
     def completed_percent(self) -> float:
-        """Rays that have ended, of all."""
+        """Percentage of rays that have ended."""
         return self._view.completed_percent
 
     @property
     def rgb(self) -> npt.NDArray[np.uint8]:
-        """(height, width, 3), drawn when it is asked for; within a time budget, first smaller."""
+        """(height, width, 3), drawn when it is asked for; smaller at first with a time budget."""
         return self._view.picture()
 
 
 @dataclass(frozen=True)
 class Request:
-    """What a frame is asked for: the arguments of Renderer.render(), which has their meaning.
+    """A request of a frame: the arguments of Renderer.render(), which describes them.
 
     Raises
     ------
@@ -93,7 +93,7 @@ class Request:
 
     @property
     def needs(self) -> dict[str, str]:
-        """Options that a renderer must be made with to draw this, and which argument needs each."""
+        """Options that a renderer needs to draw this, and the argument that needs each option."""
         asked = {
             "bounds": ("max_error", self.max_error is not None or "bounds" in self.outputs),
             "levels": ("voxel_pixels", self.voxel_pixels > 0),
@@ -103,7 +103,7 @@ class Request:
         return {option: argument for option, (argument, is_asked) in asked.items() if is_asked}
 
     def for_core(self) -> dict[str, Any]:
-        """The same as the fields of isowave::FrameRequest; with a camera and a size."""
+        """The request as fields of isowave::FrameRequest. Needs a camera and a size."""
         assert self.camera is not None and self.size is not None
         return {
             "eye": self.camera.eye,

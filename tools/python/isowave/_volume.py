@@ -1,4 +1,4 @@
-"""Compressed volumes, and what is drawn of them."""
+"""Compressed volumes, which draw, extract and view themselves."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from isowave._request import Request
 
 
 class Turns:
-    """A lock for calls that take turns; one from within another's on_pass gets an Error."""
+    """A lock for calls that take turns. A call from another call's on_pass gets an Error."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -61,8 +61,8 @@ class Turns:
 class Volume(Voxels):
     """A compressed volume. It cannot be changed, and threads may share it.
 
-    Made by compress() and open(). It is an array of float32, (z, y, x), that indexing decodes:
-    volume[10], volume[10:20, ::4, -1]. Level has more of that.
+    compress() and open() make volumes. A volume is an array of float32, (z, y, x), that indexing
+    decodes: volume[10], volume[10:20, ::4, -1] (see Level).
 
     A volume in a .zfp file is pickled as the file's path, so other processes of this machine open
     the same file. A volume in memory is pickled with its compressed voxels.
@@ -74,7 +74,7 @@ class Volume(Voxels):
         file: str | None = None,
         spacing: tuple[float, ...] | None = None,
     ) -> None:
-        """file: the .zfp that has the voxels; spacing: what open() was given in place of its."""
+        """file: the .zfp that has the voxels; spacing: given to open(), in place of the file's."""
         super().__init__(core)
         self._file, self._file_spacing = file, spacing
         self._lock = Turns()
@@ -91,7 +91,7 @@ class Volume(Voxels):
             return from_bytes, (path.read_bytes(),)
 
     def renderer(self, **options: Any) -> Renderer:
-        """A Renderer of this volume; see there for the options."""
+        """Makes a Renderer of this volume, with Renderer's options."""
         return Renderer(self, **options)
 
     def camera(
@@ -117,8 +117,8 @@ class Volume(Voxels):
     ) -> Image:
         """Draws the isosurface; Renderer.render has the other arguments.
 
-        The renderer is kept for the next call. While a driver compiles its kernels, which may take
-        half a minute the first time on a machine, the host draws; the bits are the same.
+        The renderer is kept for the next call. A driver may compile its kernels for half a minute
+        the first time on a machine. The host draws meanwhile, with the same bits.
 
         Parameters
         ----------
@@ -153,7 +153,7 @@ class Volume(Voxels):
             return self._renderer_for(wanted).draw(request)
 
     def _renderer_for(self, wanted: dict[str, Any]) -> Renderer:
-        """The kept renderer, or a new one if that lacks what is wanted."""
+        """The kept renderer, or a new one if the kept one lacks what is wanted."""
         made = self._made_with
         size = wanted.pop("size", (0, 0))
         samples = wanted.get("samples", 1)
@@ -167,7 +167,8 @@ class Volume(Voxels):
         if self._renderer is None or not fits:
             self._renderer = None  # its memory goes before that of the next is taken
             largest = max(size, (1280, 720), key=lambda s: s[0] * s[1])
-            # Or two kinds of requests in turn would make it anew.
+            # The new one can do what the old one could, or two kinds of requests in turn would make
+            # it anew each time.
             more = {name: bool(wanted.get(name) or made.get(name)) for name in CAPABILITIES}
             self._made_with = {**wanted, **more}
             try:
@@ -190,28 +191,28 @@ class Volume(Voxels):
         normals: str = "smooth",
         device: str | int | None = None,
     ) -> dict[str, npt.NDArray[Any]]:
-        """Where rays of any origin and direction first cross the isosurface.
+        """Finds where rays of any origin and direction first cross the isosurface.
 
         Parameters
         ----------
         rays
-            (..., 6): origin and direction, (x, y, z) in world space. float64 counts.
+            (..., 6): origin and direction, (x, y, z) in world space, as float64.
         isovalue
             The surface is where the trilinear field crosses this value.
         normals
-            "smooth", or "cell": of the trilinear field itself.
+            "smooth": central differences; "cell": gradients of the trilinear field itself.
         device
-            "gpu", "cpu", an index, or a part of a name: casts them there, from compressed blocks.
-            None: on the host, where the first call reads the whole volume for its value ranges.
-            These, 0.17 bytes a voxel, and the blocks that rays come to stay in memory until the
-            volume goes, a quarter of the host's at most; volumes whose ranges alone take more are
-            left to the default device. The result is the same.
+            "gpu", "cpu", an index, or a part of a name: the device that casts the rays, through
+            compressed blocks. None: the host. Its first call reads the whole volume for value
+            ranges, 0.17 bytes a voxel. The ranges and the blocks that rays come to stay in memory
+            as long as the volume lives, at most a quarter of the host's memory. If the ranges alone
+            take more, the default device casts the rays. The result is the same.
 
         Returns
         -------
         dict of arrays with the rays' leading axes
             t_hit: in lengths of the direction, inf if nothing is hit. normals: (..., 3), world
-            space, of length 1, away from larger values. position: (..., 3), world space, nan where
+            space, of length 1, away from larger values. position: (..., 3), world space, nan if
             nothing is hit. cell: (..., 3), (z, y, x) of the voxel at the cell's lowest corner.
         """
         with self._lock:
@@ -239,29 +240,30 @@ class Volume(Voxels):
         memory_budget: int | None = None,
         progress: Callable[[str, float], object] | None = None,
     ) -> Mesh:
-        """The isosurface as triangles, by marching cubes on the device.
+        """Extracts the isosurface as triangles, by marching cubes on the device.
 
-        The result is in memory; `isowave extract` writes surfaces that are larger to a file.
+        The result is in memory. `isowave extract` writes surfaces larger than memory to a file.
 
         Parameters
         ----------
         isovalue
             The surface is where the field crosses this value along edges between voxels.
         level
-            Level of detail; each has half the voxels of the last along each axis.
+            Level of detail; 0: the volume itself. Each has half the voxels of the last along each
+            axis.
         normals
-            Whether vertices have normals, central differences of voxels. Without, fewer blocks are
-            decoded.
+            Whether vertices have normals, central differences of voxels. Without normals, fewer
+            blocks are decoded.
         vertices
-            "apart": at least 1/1024 of an edge from its voxels, so that no triangle is without
+            "apart": at least 1/1024 of an edge away from voxels, so that every triangle has an
             area, and programs that merge vertices by position find the mesh closed. "exact": where
-            the isovalue is crossed; on a voxel that equals it, vertices meet.
+            the field equals the isovalue; vertices meet on a voxel that equals it.
         device
             "gpu", "cpu", an index, or a part of a name; None: $ISOWAVE_DEVICE, else the first GPU.
         memory_budget
             Most device memory to take [bytes]; None: three quarters of it.
         progress
-            Called with what is done and how much of it, 0 to 1.
+            Called with what extract() is doing and how much of it is done, 0 to 1.
         """
         if vertices not in ("apart", "exact"):
             raise ValueError(f"vertices={vertices!r:.60}: there are apart and exact")
@@ -293,8 +295,8 @@ class Volume(Voxels):
         Returns
         -------
         dict
-            equal: whether all are the same; differing_pixels, differing_depths, differing_normals:
-            how many are not; hits: rays that hit something.
+            equal: whether all bits are the same; differing_pixels, differing_depths,
+            differing_normals: how many differ; hits: how many rays hit the surface.
         """
         request = Request(isovalue, camera, size)
         with self._lock:
@@ -323,7 +325,7 @@ class Volume(Voxels):
 
 
 def open_again(path: str, spacing: tuple[float, ...] | None) -> Volume:
-    """A pickled volume of a file."""
+    """Opens a pickled volume of a file."""
     core = _core.open(
         path, {}, None, None, None if spacing is None else reversed_axes(spacing), None
     )
@@ -332,7 +334,7 @@ def open_again(path: str, spacing: tuple[float, ...] | None) -> Volume:
 
 
 def from_bytes(data: bytes) -> Volume:
-    """A pickled volume of memory: it stays in a file without a name."""
+    """Opens a pickled volume of memory, which then stays in a file without a name."""
     with tempfile.TemporaryDirectory() as folder:
         path = pathlib.Path(folder, "volume.zfp")
         path.write_bytes(data)
@@ -340,6 +342,6 @@ def from_bytes(data: bytes) -> Volume:
 
 
 def warn_of_file(core: _core.Volume) -> None:
-    """Tells the caller's caller what is strange about a volume's file."""
+    """Warns the caller's caller of what is strange about a volume's file."""
     for notice in core.notices:
         warnings.warn(notice, RuntimeWarning, stacklevel=3)

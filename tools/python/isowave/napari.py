@@ -39,13 +39,13 @@ LayerData = tuple[Any, dict[str, Any], str]
 class ShownLevel(Level):
     """A level of a volume as napari wants arrays.
 
-    Voxel k of level n lies at voxel 2^n k of the volume, and napari takes the ratio of their sides
-    for the ratio of their voxels. So of the level's voxels those are shown that make it so: sides
-    divided by 2^n, rounded up. What lies behind the volume's last voxel goes. Where 2^n does not
-    divide a side, napari shows the level up to one of its voxels away from its place.
+    Voxel k of level n lies at voxel 2^n k of the volume. napari takes the ratio of the sides of two
+    levels for the ratio of their voxels' sizes. So a level shows only as many voxels as make this
+    true: its sides are those of the volume divided by 2^n, rounded up. If 2^n does not divide a
+    side, napari shows the level up to one of its voxels away from its place.
 
-    napari cuts out what its canvas shows, through all slices, before it takes one of them. So a box
-    of a level is decoded when it is indexed in turn, or made an array.
+    napari cuts out what its canvas shows, through all slices, before it takes one slice. So a box
+    of a level is decoded only when the box is indexed, or made an array.
     """
 
     def __init__(self, volume: Volume, number: int) -> None:
@@ -55,7 +55,7 @@ class ShownLevel(Level):
 
     @property
     def is_kept(self) -> bool:
-        """Whether all of it has been decoded."""
+        """Whether the whole level has been decoded."""
         return self._voxels is not None
 
     def __getitem__(self, key: Any) -> Any:
@@ -77,7 +77,7 @@ class ShownLevel(Level):
 
 
 class Box(Level):
-    """Some of a level's voxels, not decoded yet."""
+    """A box of a level's voxels, not decoded yet."""
 
     def __init__(self, level: ShownLevel, ranges: Sequence[range]) -> None:
         super().__init__(level._volume, level._number, [len(r) for r in ranges])
@@ -91,8 +91,8 @@ class Box(Level):
 def levels_of(volume: Volume, *, texture: int = LARGEST_TEXTURE) -> list[ShownLevel]:
     """The levels of a layer, finest first.
 
-    texture: voxels that a 3D texture may have. The last level is the first that does not exceed it,
-    or the volume's coarsest.
+    texture: most voxels of a 3D texture. The layer ends with the first level that fits into it, or
+    with the volume's coarsest.
     """
     levels = [ShownLevel(volume, number) for number in range(volume.num_levels)]
     last = 0
@@ -106,10 +106,10 @@ def fits_texture(level: ShownLevel, texture: int) -> bool:
 
 
 def layer_data(volume: Volume, **options: Any) -> LayerData:
-    """What napari makes a multiscale image layer of.
+    """The data that napari makes a multiscale image layer of.
 
-    Scale and translate are the volume's spacing and origin, (z, y, x); affine is there where the
-    volume's axes are not those of the world. options: of levels_of().
+    Scale and translate are the volume's spacing and origin, (z, y, x). If the volume's axes are not
+    those of the world, there is an affine, too. options: for levels_of().
     """
     levels = levels_of(volume, **options)
     attributes: dict[str, Any] = {
@@ -132,9 +132,9 @@ def layer_data(volume: Volume, **options: Any) -> LayerData:
 
 
 def add_volume(viewer: Any, volume: Volume, **options: Any) -> Any:
-    """Adds a volume to a napari viewer as a multiscale image layer, which is returned.
+    """Adds a volume to a napari viewer as a multiscale image layer, and returns the layer.
 
-    options: of levels_of(), and of viewer.add_image().
+    options: for levels_of(), and for viewer.add_image().
     """
     own = {"texture": options.pop("texture")} if "texture" in options else {}
     levels, attributes, _ = layer_data(volume, **own)
@@ -144,15 +144,15 @@ def add_volume(viewer: Any, volume: Volume, **options: Any) -> Any:
 def get_reader(
     path: str | Sequence[str],
 ) -> Callable[[str | Sequence[str]], list[LayerData]] | None:
-    """napari's door: a function that reads the path, or None for several."""
+    """Called by napari: returns a function that reads the path, or None for several paths."""
     return read if isinstance(path, str) else None
 
 
 def read(path: str | Sequence[str]) -> list[LayerData]:
-    """A layer of a file.
+    """Reads a file as a layer.
 
-    What is not .zfp is compressed into memory: integers below 2^24 exactly, others with errors of
-    at most 2^-16 of their range.
+    Files other than .zfp are compressed into memory: exactly if float32 holds their values,
+    otherwise with errors of at most 2^-16 of their range.
     """
     assert isinstance(path, str)
     levels, attributes, kind = layer_data(open_with_levels(path))
@@ -165,7 +165,7 @@ def open_with_levels(path: str) -> Volume:
         return open(path)
     try:
         return open(path, exact=True, levels=0, progress=False)
-    except Error:  # not integers, or no volume: then what follows says so
+    except Error:  # float32 does not hold the values, or no volume: the next open() then fails
         pass
     return open(path, relative_tolerance=2**-16, levels=0, progress=False)
 
@@ -179,12 +179,12 @@ def add_isosurface(
     name: str = "isosurface",
     **request: Any,
 ) -> Any:
-    """Adds what isowave draws from the viewer's 3D camera, as a surface layer, which is returned.
+    """Draws the isosurface from the viewer's 3D camera, and returns it as a surface layer.
 
-    Its vertices are where the pixels' rays hit the isosurface of the volume itself, of any size; so
-    it is in its place among other layers, and exact from this camera, while the viewer may turn.
-    What this camera cannot see is not there: call it again to replace the layer by what the next
-    camera sees. Neighbouring pixels are joined but where the depth steps by more than ten pixels.
+    Vertices are the places where the pixels' rays hit the isosurface, so the layer lies in its
+    place among other layers, and is exact from this camera, while the viewer may turn. The layer
+    lacks what this camera cannot see: call add_isosurface() again to replace it by what the next
+    camera sees. Neighbouring pixels are joined unless the depth steps by more than ten pixels.
 
     Parameters
     ----------

@@ -8,7 +8,7 @@ pvpython:
     LoadPlugin(".../isowave/paraview_reader.py", ns=globals())
     head = IsowaveReader(FileName="head.zfp", Level=1)
 
-The package must be of the version of Python that ParaView has. It is found beside this file, so
+The package must be made for ParaView's version of Python. It is found beside this file, so
 that ParaView need not know of a virtual environment.
 """
 
@@ -69,8 +69,8 @@ class IsowaveReader(VTKPythonAlgorithmBase):
     @smproperty.intvector(name="Level", default_values=0)
     @smdomain.intrange(min=0, max=15)
     def SetLevel(self, level: int) -> None:
-        """0: the volume itself; each has half the voxels of the last along each axis. Past the
-        coarsest: the coarsest."""
+        """Level of detail. 0: the volume itself; each has half the voxels of the last along each
+        axis. A number beyond the coarsest means the coarsest."""
         if level != self._level:
             self._level = level
             self.Modified()

@@ -1,4 +1,4 @@
-"""Isosurfaces in the scenes of PyVista: our picture, with its depth, among other meshes.
+"""Isosurfaces in the scenes of PyVista: a picture with depth among other meshes.
 
     import pyvista
     import isowave.pyvista
@@ -9,10 +9,10 @@
     plotter.show()
     surface.isovalue = 90
 
-Whenever VTK is about to draw the scene, isowave draws the surface with the scene's camera and size,
-unless neither these nor the surface have changed. A rectangle as large as the view then writes
-colour and depth of each pixel among VTK's opaque meshes. So meshes hide the surface, and it them,
-pixel by pixel; translucent meshes are blended over it.
+Before VTK draws the scene, isowave draws the surface with the scene's camera and size, if the
+camera, the size or the surface has changed. A rectangle as large as the view then writes colour and
+depth of each pixel among VTK's opaque meshes. So meshes and surface hide each other pixel by pixel;
+translucent meshes are blended over the surface.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ surfaces_of: weakref.WeakKeyDictionary[Any, list[Isosurface]] = weakref.WeakKeyD
 class Isosurface:
     """An isosurface in a plotter's scene, made by add_isosurface().
 
-    What is set is seen when the scene is drawn next.
+    Changes are seen when the scene is drawn next.
     """
 
     def __init__(
@@ -109,7 +109,7 @@ class Isosurface:
         self.actor.SetVisibility(value)
 
     def remove(self) -> None:
-        """Takes the surface out of the scene. May be called again."""
+        """Removes the surface from the scene. May be called again."""
         renderer, plotter = self._renderer(), self._plotter()
         if self._observer is None:
             return
@@ -121,7 +121,7 @@ class Isosurface:
         self._observer = None
 
     def _update(self, renderer: Any, _event: str) -> None:
-        """Draws what the renderer, which is about to draw, shows of the surface."""
+        """Draws the surface for the renderer, which is about to draw its scene."""
         if not self.visible or not renderer.HasViewProp(self.actor):
             return
         try:
@@ -178,15 +178,17 @@ def add_isosurface(
 ) -> Isosurface:
     """Adds an isosurface to the plotter's active scene.
 
-    It is opaque, has one ray for each pixel, and its own light: a headlight, and one from above.
-    Not for scenes with shadows (plotter.enable_shadows()), which VTK draws from the lights' places.
+    The surface is opaque, has one ray for each pixel, and its own light: a headlight, and one from
+    above. Shadows (plotter.enable_shadows()) are wrong in scenes with it, since VTK draws them from
+    the lights' places.
 
     Parameters
     ----------
     plotter
-        The surface is in its active scene.
+        The plotter whose active scene gets the surface.
     volume
-        In the scene's world space; isowave.compress(pyvista.ImageData) is where the image is.
+        Lies in the scene's world space. isowave.compress(pyvista.ImageData) lies where the image
+        does.
     isovalue
         The surface is where the trilinear field crosses this value.
     color
@@ -196,14 +198,15 @@ def add_isosurface(
     max_error, voxel_pixels, normals
         As for Renderer.render.
     reset_camera
-        Whether the camera is set such that all of the scene is seen; None: unless it was set.
+        Whether to set the camera so that all of the scene is seen; None: unless it was set.
 
     Returns
     -------
     Isosurface
-        With it, isovalue and colour are changed, and the surface is removed.
+        Changes isovalue and colour, and removes the surface.
 
-    A scene that cannot be drawn gets a warning, and screenshot() raises ValueError.
+    If the scene cannot be drawn with the surface, there is a warning, and screenshot() raises
+    ValueError.
     """
     request = Request(
         isovalue,
@@ -220,9 +223,9 @@ def add_isosurface(
 
 
 def screenshot(plotter: pyvista.Plotter, **options: Any) -> npt.NDArray[np.uint8]:
-    """What the plotter shows now, isosurfaces among it: uint8 (height, width, 3).
+    """Returns what the plotter shows now, with isosurfaces: uint8 (height, width, 3).
 
-    options are those of pyvista.Plotter.screenshot. Raises what kept a surface from being drawn.
+    options: for pyvista.Plotter.screenshot. Raises the error of a surface that cannot be drawn.
     """
     surfaces = list(surfaces_of.get(plotter, []))
     for surface in surfaces:
@@ -239,9 +242,9 @@ def screenshot(plotter: pyvista.Plotter, **options: Any) -> npt.NDArray[np.uint8
 
 @dataclass(frozen=True)
 class View:
-    """What a vtkRenderer shows: a part of a picture whose middle the camera looks at.
+    """The part of a picture that a vtkRenderer draws; the camera looks at the picture's middle.
 
-    The part is less than the whole where VTK draws pictures larger than the window in tiles.
+    The part is smaller than the picture if VTK draws pictures larger than the window in tiles.
     """
 
     camera: Camera
@@ -251,7 +254,7 @@ class View:
 
 
 def view_of(renderer: Any) -> View:
-    """The view by the matrices that VTK is about to draw with."""
+    """The view, from the matrices that VTK is about to draw with."""
     camera, aspect = renderer.GetActiveCamera(), renderer.GetTiledAspectRatio()
     is_parallel = bool(camera.GetParallelProjection())
     part = part_of(renderer)
@@ -263,7 +266,7 @@ def view_of(renderer: Any) -> View:
         raise ValueError("isosurfaces need a camera that does not scale the scene")
     if not np.isclose(projection[0, 0] * aspect, projection[1, 1]):
         raise ValueError("isosurfaces need a camera with square pixels")
-    # Of the middle, in halves of the part.
+    # The middle's shift, in halves of the part.
     shift = -projection[:2, 3] if is_parallel else projection[:2, 2]
     exact = part * (1 + np.abs(shift))
     whole = np.rint(exact).astype(int)

@@ -437,7 +437,7 @@ def test_each_chunk_is_fetched_once(dtype, chunk_layers, slab):
 @pytest.mark.parametrize("chunk_layers", [1, 4, 5, 16, 40])
 @pytest.mark.parametrize("slab", [4, 5, 32, 64])
 def test_memory_is_one_chunk_row_and_a_slab(dtype, chunk_layers, slab):
-    """Of arrays of numpy, as tracemalloc counts them, while all slabs are read."""
+    """Memory of numpy's arrays, as tracemalloc counts it, while all slabs are read."""
     import tracemalloc
 
     side = 200  # large layers, beside which Python's own objects are small

@@ -19,7 +19,7 @@ import pytest
 
 from isowave._arrays import ArrayTypeError, ArrayValueError, as_source
 
-# Of what packages say while the inputs are made: casts that overflow, masked elements.
+# Warnings of packages while the inputs are made: casts that overflow, masked elements.
 pytestmark = pytest.mark.filterwarnings("ignore")
 
 NUM_INPUTS = int(os.environ.get("ISOWAVE_FUZZ_INPUTS", "10000"))

@@ -1,4 +1,4 @@
-"""Drivers that nobody registered, as in GPU containers: found by their name."""
+"""Drivers that are not registered, as in GPU containers, are found by their name."""
 
 import json
 import os

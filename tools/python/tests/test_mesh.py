@@ -64,7 +64,7 @@ def test_mesh_is_that_of_vtk(array, isovalue):
 
 
 def real_volumes():
-    """Of the folder that the environment variable names, such as one of Open SciVis sets."""
+    """Volumes of the folder that ISOWAVE_TEST_VOLUMES names, such as one of Open SciVis sets."""
     folder = os.environ.get("ISOWAVE_TEST_VOLUMES")
     found = sorted(pathlib.Path(folder).iterdir()) if folder else []
     says_dims = r"(_\d+x\d+x\d+_\w+\.raw(\.gz)?|\.mha|\.nrrd)$"
@@ -256,7 +256,7 @@ def test_files(tmp_path):
     pyvista = pytest.importorskip("pyvista")
     for ending in ("ply", "vtp", "obj"):
         read = pyvista.read(tmp_path / f"a.{ending}")
-        # Of OBJ's text, VTK makes float64.
+        # VTK reads OBJ's text as float64.
         np.testing.assert_array_equal(np.asarray(read.points, np.float32), mesh.vertices)
         np.testing.assert_array_equal(read.regular_faces, mesh.faces)
     surface = mesh.to_pyvista()

@@ -35,8 +35,8 @@ print(found.hexdigest())
 
 
 def test_no_other_library_answers_calls_to_libzfp(tmp_path):
-    """These come first in the process, as do the libraries that ParaView's program was linked with;
-    whoever calls one of them ends there."""
+    """Functions of libzfp's names come first in the process, as do the libraries that ParaView's
+    program was linked with. They end a process that calls them."""
     compiler = shutil.which("cc") or shutil.which("gcc")
     if not compiler:
         pytest.skip("no C compiler makes the library that would answer")

@@ -71,7 +71,7 @@ def browser() -> Iterator[Any]:
     with playwright.sync_playwright() as started:
         if FIREFOX:  # the distribution's own, by WebDriver BiDi
             preferences = {
-                "dom.events.testing.asyncClipboard": True,  # nobody is asked before a paste
+                "dom.events.testing.asyncClipboard": True,  # Firefox pastes without asking
                 "ui.prefersReducedMotion": 1,
             }
             browser = started.firefox.launch(

@@ -106,10 +106,10 @@ def test_a_malformed_message_ends_one_view(front: FrontEnd) -> None:
     front.wait("bad", type="closed", retry=False)
     for odd in (None, 1, [], "x", {"view": "a"}, {"view": 5, "message": HELLO}, {"view": "x" * 99}):
         front.widget._handle_custom_msg(odd, [])
-    front.say("nobody", WISH)
+    front.say("unknown", WISH)
     front.say("good", WISH)
     front.wait("good", type="picture", stage="lossless")
-    assert "nobody" not in front.heads
+    assert "unknown" not in front.heads
 
 
 def test_views_that_are_gone_leave_nothing(front: FrontEnd) -> None:
@@ -195,7 +195,7 @@ def jupyter(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[str]
 
 @pytest.fixture(scope="module")
 def page() -> Iterator[Any]:
-    """Of Chromium."""
+    """A page of Chromium."""
     playwright = pytest.importorskip("playwright.sync_api")
     chromium = os.environ.get("ISOWAVE_CHROMIUM") or shutil.which("chromium")
     if not chromium:

@@ -24,12 +24,12 @@ Matrix = tuple[Vector, Vector, Vector]
 MAX_DIM = 1 << 16
 """Most voxels along an axis, as in core/volume."""
 _LEAST_DETERMINANT = 1e-6
-"""Of a direction matrix that can be inverted, as in core/volume."""
+"""Least determinant of a direction matrix that can be inverted, as in core/volume."""
 _UNIT_TOLERANCE = 1e-3
 """How far the length of a given direction's columns may be from 1: they come rounded."""
 
 _MOST_CHANNELS = 4
-"""Of the last axis of an array of colours, such as RGBA."""
+"""Most channels in the last axis of an array of colours, such as RGBA."""
 
 IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 

@@ -79,7 +79,7 @@ def xarray_dataarray(array: Any, has_spacing: bool) -> Found:
     placement = of_steps((steps[2], steps[1], steps[0]), (origin[2], origin[1], origin[0]))
 
     def fetch(begin: int, end: int) -> Any:
-        # Of the variable, because indexing an array indexes all its coordinates, too.
+        # Indexes the variable, because indexing an array indexes all its coordinates, too.
         layers = array.variable.isel({dims[0]: slice(begin, end)}).values
         return layers if order is None else layers.transpose(order)
 

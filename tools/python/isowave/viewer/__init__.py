@@ -1,4 +1,4 @@
-"""Looks at a volume: in a browser (`isowave[view]`) or in a notebook (`isowave[notebook]`)."""
+"""Shows a volume in a browser (`isowave[view]`) or in a notebook (`isowave[notebook]`)."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ def view(
     block: bool | None = None,
     **options: Any,
 ) -> Widget | Server | None:
-    """Shows a volume: as a widget in a notebook, elsewhere in a browser tab.
+    """Shows a volume: in a notebook as a widget, elsewhere in a browser tab.
 
-    notebook  whether to make a widget; None: if a Jupyter kernel runs and anywidget is there
-    block     in a browser: whether to return only when Ctrl-C ends it, and then None;
-              None: unless Python is interactive
-    options   isovalue     at first; None: the one that divides the histogram best
+    notebook  whether to make a widget; None: if a Jupyter kernel runs and anywidget is installed
+    block     in a browser: whether to wait until Ctrl-C, and then return None; None: unless Python
+              is interactive
+    options   isovalue     first isovalue; None: the one that divides the histogram best
               device, memory_budget [bytes], size (width, height) [pixels], samples: as for Renderer
-              title        above the picture
-              max_clients  that look at the same time
-              max_rays     of a client's picture: pixels x samples^2 x (1 + ambient rays); larger
-                           ones are drawn smaller, and say so; 150 million by default
-              height       of the widget [CSS pixels]
-              host, port, open_browser: of the server; port 0: a free one
+              title        text above the picture
+              max_clients  most clients at the same time
+              max_rays     most rays of a client's picture, pixels x samples^2 x (1 + ambient rays);
+                           larger pictures are drawn smaller, and say so; 150 million by default
+              height       height of the widget [CSS pixels]
+              host, port, open_browser: for the server; port 0: a free one
 
     Ctrl-C returns within a second. A long pass then ends in a thread of its own.
 

@@ -68,28 +68,28 @@ def make_parser() -> argparse.ArgumentParser:
     )
     add = parser.add_argument
     add("volume", help="file of any format that isowave reads, or generate:...")
-    add("-i", "--isovalue", type=float, help="at first")
+    add("-i", "--isovalue", type=float, help="first isovalue [divides the histogram best]")
     add("--device", help="index, type (gpu, cpu) or a part of the name")
-    add("--memory-budget", type=_argument(parse_bytes), help="of device memory: 600MB, 1GiB")
-    add("--size", type=_argument(parse_size), default=(1920, 1080), help="of the largest picture")
+    add("--memory-budget", type=_argument(parse_bytes), help="most device memory: 600MB, 1GiB")
+    add("--size", type=_argument(parse_size), default=(1920, 1080), help="largest picture")
     add("--rate", type=int, help="bits per voxel [all that float32 holds]")
-    add("--tolerance", type=float, help="each voxel is within this of the input's")
-    add("--tolerance-relative", type=float, help="the same, as a part of the range of values")
+    add("--tolerance", type=float, help="largest error of a voxel")
+    add("--tolerance-relative", type=float, help="as a part of the range of values")
     add("--exact", action="store_true", help="refuse voxels that float32 does not hold")
-    add("--levels", type=_argument(parse_levels), metavar="N|all", help="levels of detail")
+    add("--levels", type=_argument(parse_levels), metavar="N|all", help="how many levels of detail")
     add("--dims", type=int, nargs="+", help="voxels of a raw file: X Y Z, or N for a cube")
     add("--type", help="voxel type of a raw file: uint8, int8, ... float32, float64")
     add("--spacing", type=float, nargs="+", help="world units between voxels: X Y Z, or one")
-    add("--no-data", type=float, help="voxels of this value have no data, as NaN voxels have none")
-    add("--host", default="127.0.0.1", help="to listen at; others than loopback are not encrypted")
-    add("--port", type=int, default=0, help="0: a free one")
-    add("--max-clients", type=int, default=16, help="that look at the same time")
+    add("--no-data", type=float, help="value of voxels without data, beside NaN")
+    add("--host", default="127.0.0.1", help="address to listen at; traffic is not encrypted")
+    add("--port", type=int, default=0, help="port to listen at; 0: a free one")
+    add("--max-clients", type=int, default=16, help="most clients at the same time")
     add(
         "--max-rays",
         type=int,
         default=MAX_RAYS,
-        help="of a client's picture: pixels x samples x (1 + ambient rays); larger pictures are "
-        "drawn smaller, which the page says [%(default)s]",
+        help="most rays of a client's picture: pixels x samples x (1 + ambient rays); larger "
+        "pictures are drawn smaller, which the page says [%(default)s]",
     )
     add("--no-browser", action="store_true", help="only print the URL")
     return parser

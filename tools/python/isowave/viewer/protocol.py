@@ -51,7 +51,7 @@ class Hello:
 
 @dataclass(frozen=True)
 class Wish:
-    """What a front end wants to see. Of a client's wishes only the newest counts.
+    """What a front end wants to see. Only the newest wish of a client counts.
 
     request  the whole picture, with a size; without a camera: the surface fills the picture
     """

@@ -5,7 +5,7 @@
     Scene                     the thread in which all is drawn
     Session (session.py)      a front end's connection
 
-Of each client the newest wish counts; it cancels the frame of the one before. A wish is drawn in
+The newest wish of a client counts; it cancels the frame of the one before. A wish is drawn in
 stages: a first picture of a quarter of the width and height; the whole picture (sent as JPEG after
 passes); once the client rests, the lossless picture (PNG), and what is certain of it. Clients take
 turns, stage by stage; a long picture gives way to smaller ones between two passes. At most two
@@ -52,8 +52,8 @@ class Scene:
                    a client wants more
     max_clients    further ones are refused
     max_rays       of a client's picture: pixels x samples^2 x (1 + ambient). A larger one is drawn
-                   with fewer pixels, then fewer ambient rays, and says so. Of the camera's rays
-                   there are MAX_CAMERA_RAYS at most, or as many as `size` and `samples` have.
+                   with fewer pixels, then fewer ambient rays, and says so. At most
+                   MAX_CAMERA_RAYS come from the camera, or as many as `size` and `samples` have.
     make_host      a renderer that draws while the first one of the device is prepared, or None
     clock          seconds; tests replace it
     start          False: no thread; call step() instead, as tests do
