@@ -60,7 +60,7 @@ struct MemoryPlan {
   std::uint64_t setup_bytes =
       0;  ///< all that exists while the value ranges are built, scratch included
   std::uint32_t cache_slots = 0;
-  /// The cache may grow to so many, between frames; where it cannot grow: cache_slots.
+  /// The cache may grow to so many, between frames; cache_slots if it cannot grow.
   std::uint32_t most_slots = 0;
   StreamPlace stream = StreamPlace::kDevice;  ///< kDevice or kHost
   std::uint32_t window_blocks = 0;            ///< kHost: see StreamWindow
@@ -77,34 +77,34 @@ struct MemoryPlan {
 /// The plan of the same renderer once its cache has so many slots.
 MemoryPlan resized(MemoryPlan plan, std::uint32_t cache_slots);
 
-/// Slots with which a cache begins that may grow: for the blocks that a frame needs in most volumes
-/// and as many again, so that the next frame finds free ones. Twice that with rays of any origin:
-/// ambient rays come to blocks that the camera's do not, and a cache that has to grow for them
-/// makes the second frame a cold one.
+/// Initial number of slots of a cache that may grow: twice the blocks that a frame needs in most
+/// volumes, so that the next frame finds free slots. Twice that with rays of any origin: ambient
+/// rays come to blocks that the camera's rays do not, and a cache that grows for them makes the
+/// second frame a cold one.
 std::uint32_t first_cache_slots(std::uint64_t num_blocks, std::uint64_t num_rays,
                                 bool with_given_rays = false);
 
-/// Slots for the next frame, after one that has freed `recycled` slots of blocks that it had asked
-/// for itself; plan.cache_slots where these do.
+/// Slots for the next frame, after one that has freed `recycled` slots of blocks that it had
+/// requested itself; plan.cache_slots if these are enough.
 std::uint32_t grown_cache_slots(const MemoryPlan &plan, std::uint64_t recycled);
 
-/// The plan with so many cache slots and the stream where request.stream says; kAuto: on the
-/// device.
+/// The plan with so many cache slots, and with the stream at the place of request.stream; kAuto: on
+/// the device.
 ///
 /// Throws  Error: the stream does not fit four buffers on the device
 MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &request,
                        std::uint32_t cache_slots);
 
-/// As plan_memory(), but kAuto leaves the stream on the host where the plan would otherwise exceed
-/// the budget, and that takes less.
+/// As plan_memory(), but kAuto leaves the stream on the host if the plan would otherwise exceed the
+/// budget, and the stream on the host takes less.
 ///
 /// budget  [bytes]
 MemoryPlan plan_with_slots(const CompressedVolume &volume, const MemoryRequest &request,
                            std::uint64_t budget, std::uint32_t cache_slots);
 
 /// The plan with the most cache slots whose peak is within a budget, and whose buffers the device
-/// can allocate. kAuto leaves the stream on the host where that gives more slots, and those that
-/// the device would have beside the stream are not enough to be useful.
+/// can allocate. kAuto leaves the stream on the host if that gives more slots, and the device would
+/// not have enough useful ones beside the stream.
 ///
 /// budget     [bytes]
 /// max_slots  the most slots wanted
@@ -112,9 +112,9 @@ MemoryPlan plan_with_slots(const CompressedVolume &volume, const MemoryRequest &
 MemoryPlan plan_within(const ocl::Device &device, const CompressedVolume &volume,
                        const MemoryRequest &request, std::uint64_t budget, std::uint32_t max_slots);
 
-/// A plan that can grow to as many slots as plan_within() gives. It begins with
-/// first_cache_slots(), or, where that keeps it below the decoded volume, with as little as half of
-/// them; with first_slots, where these are not 0.
+/// A plan that can grow to as many slots as plan_within() gives. It begins with first_slots, or if
+/// that is 0 with first_cache_slots(), or with as little as half of these if that keeps it below
+/// the decoded volume.
 ///
 /// budget, max_slots, Throws  as plan_within()
 MemoryPlan plan_to_grow(const ocl::Device &device, const CompressedVolume &volume,

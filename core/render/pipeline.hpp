@@ -17,11 +17,11 @@ class BlockStore;
 class Wave;
 struct RendererOptions;
 
-/// Packets of eight rays; where they cannot be had (MarchPackets), there are none.
+/// Whether rays march in packets of eight; kOn: if the device can (MarchPackets).
 enum class RayPackets { kAuto, kOn, kOff };
 
-/// Blocks that packets decode when they come to them, instead of waiting for the next pass; never
-/// where the stream stays on the host.
+/// Whether packets decode the blocks that they come to, instead of waiting for the next pass; never
+/// if the stream stays on the host.
 enum class DecodeOnDemand { kAuto, kOn, kOff };
 
 /// What the lengths of a wave's buffers depend on.

@@ -59,9 +59,9 @@ class Macrocells {
              std::shared_ptr<MacrocellBuffers> buffers = {}, std::vector<float> thresholds = {},
              std::array<float, 2> *extremes = nullptr);
 
-  /// Makes masks() for an isovalue; nothing to do where they are those in use. Ranges were made of
-  /// voxels of all bit planes, and blocks may since be decoded to other values: by voxel_error and
-  /// by the offsets of `moved`, ranges are taken to be wider.
+  /// Makes masks() for an isovalue, unless they are those in use. Ranges were made of voxels of all
+  /// bit planes, and blocks may since be decoded to other values. So ranges are taken to be wider,
+  /// by voxel_error and by the offsets of `moved`.
   ///
   /// frame        its grid, place and surface.isovalue are used
   /// voxel_error  how far a decoded voxel may be from the one that the ranges were made of
@@ -76,7 +76,7 @@ class Macrocells {
 
   /// The box around the active blocks of the isovalue selected last.
   ///
-  /// Returns  nothing where no block is active
+  /// Returns  nothing if no block is active
   /// Waits    yes
   std::optional<BlockBox> active_blocks(const FrameParams &frame) const;
 

@@ -28,7 +28,7 @@ struct Wavefront {
     bool with_pairs = true;      ///< pipeline `blocks` needs the arrays of ray-block pairs
     std::size_t num_levels = 1;  ///< of detail
     bool with_given = false;     ///< there may be rays of RaySource::kGiven
-    bool with_walks = true;      ///< rays walk from block to block: not where triangles are drawn
+    bool with_walks = true;      ///< rays walk from block to block: false if triangles are drawn
     bool scanned_pairs = false;  ///< there may be frames with Schedule::scanned_pairs
   };
   static ocl::BufferSizes sizes(const Limits &limits);
@@ -82,7 +82,7 @@ struct Wavefront {
       level_frames;  ///< [num_level_frames] of all that draw (pipeline `rays` with several)
   std::uint32_t num_level_frames = 1;
   CountsBuffer counts;                ///< [1] of the pass at work
-  CountsBuffer previous_counts;       ///< [1] of the pass before, where open_pass() is called
+  CountsBuffer previous_counts;       ///< [1] of the pass before, if open_pass() is called
   CountsBuffer next_counts;           ///< [1] of the next such pass, opened by this one
   ocl::Buffer<HitRecord> hits;        ///< [R] by pixel: the picture so far
   ocl::Buffer<GivenRay> given;        ///< [R] of any origin; empty unless there may be some

@@ -15,7 +15,7 @@ namespace isowave::core {
 /// Lays rows of blocks along x end to end, those of a box in their order: y, then z.
 class BlockCutter {
  public:
-  /// whole  where the payload is read from; its index may be missing
+  /// whole  the volume that the payload is read from; its index may be missing
   /// box    not empty, within the whole
   BlockCutter(const CompressedVolume &whole, const BlockBox &box);
   /// first_bit  of the row in the whole's payload

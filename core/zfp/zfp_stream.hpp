@@ -66,8 +66,8 @@ struct CompressOptions {
 struct BlockBounds {
   std::vector<std::uint8_t> codes{};
   std::int32_t exponent = 0;
-  /// A voxel is off by its share (bound_share()) at most. Only where voxels are compared with the
-  /// source's.
+  /// Whether a voxel is off by at most its share (bound_share()) of the block's bound: only if
+  /// voxels are compared with the source's.
   bool by_place = false;
   /// A brick's level: the largest code in all bricks, which decides what float32 loses.
   std::uint8_t largest_of_whole = 0;
@@ -89,13 +89,12 @@ struct CompressedVolume {
   std::uint32_t bits_per_block = 0;
   BlockPrecision precision{};  ///< at a fixed rate, as it is from the start
   std::vector<std::uint32_t>
-      index{};  ///< where blocks begin that have lengths of their own: block_index.h
+      index{};  ///< places where blocks with lengths of their own begin: block_index.h
   std::uint64_t indexed_bits = 0;  ///< length of all of them
-  /// Payload from bit 0, little endian; two zero words follow the last bit. Empty where file is
-  /// set,
+  /// Payload from bit 0, little endian; two zero words follow the last bit. Empty if `file` is set.
   std::vector<std::uint32_t> words;
-  std::shared_ptr<const InputFile> file{};  ///< which holds the payload instead,
-  std::uint64_t file_first_bit = 0;         ///< from this bit on.
+  std::shared_ptr<const InputFile> file{};  ///< holds the payload instead of `words`
+  std::uint64_t file_first_bit = 0;         ///< first bit of the payload in the file
   NoData no_data{};                         ///< its voxels without data
   /// [min, max] of the source's voxels with data, as float32 and after map_nan.
   std::array<float, 2> value_range = kUnknownRange;
@@ -145,9 +144,9 @@ void set_spacing(CompressedVolume &volume, const glm::dvec3 &spacing);
 ///
 /// Throws  Error: bad rate, NaN, short file, more levels than it can have
 CompressedVolume compress(VolumeReader &reader, const CompressOptions &options);
-/// As compress(), but straight to a file and in memory O(nx * ny), and with levels 5 bytes for each
-/// block, 9 where float32 does not hold all voxels. Writes to a temporary name and renames; nothing
-/// is left behind on an error. Returns what was written, but for the words, which stay empty.
+/// As compress(), but straight to a file. Memory is O(nx * ny), and with levels 5 bytes a block (9
+/// if float32 does not hold all voxels). Writes to a temporary name and renames; leaves nothing
+/// behind on an error. Returns the volume that was written, with empty words.
 CompressedVolume compress_to_file(VolumeReader &reader, const CompressOptions &options,
                                   const std::filesystem::path &path);
 
