@@ -341,24 +341,24 @@ Certificate certify(Renderer &renderer, const CompressedVolume &volume, const Fr
   return certify(renderer, volume, request, std::span<const float>(depth));
 }
 
-CertificateSummary summarize(const Certificate &certificate, double limit) {
+CertificateSummary summarize(std::span<const float> bounds, double limit) {
   CertificateSummary summary;
-  std::vector<float> bounds;
-  for (const float bound : certificate.bounds) {
+  std::vector<float> certain;
+  for (const float bound : bounds) {
     if (bound == 0) continue;
     ++summary.num_pixels;
     if (std::isinf(bound)) {
       ++summary.num_uncertain;
     } else {
-      bounds.push_back(bound);
+      certain.push_back(bound);
     }
     summary.num_certified += double{bound} <= limit;
   }
-  if (bounds.empty()) return summary;
-  std::ranges::sort(bounds);
-  summary.median = double{bounds[bounds.size() / 2]};
-  summary.p99 = double{bounds[(bounds.size() - 1) * 99 / 100]};
-  summary.max = double{bounds.back()};
+  if (certain.empty()) return summary;
+  std::ranges::sort(certain);
+  summary.median = double{certain[certain.size() / 2]};
+  summary.p99 = double{certain[(certain.size() - 1) * 99 / 100]};
+  summary.max = double{certain.back()};
   return summary;
 }
 

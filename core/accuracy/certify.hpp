@@ -53,7 +53,11 @@ struct CertificateSummary {
   double median = 0, p99 = 0,
          max = 0;  ///< bounds of those that have one; 0 if there are none [pixels]
 };
-/// limit: pixels.
-CertificateSummary summarize(const Certificate &certificate, double limit);
+/// bounds  Certificate::bounds
+/// limit   [pixels]
+CertificateSummary summarize(std::span<const float> bounds, double limit);
+inline CertificateSummary summarize(const Certificate &certificate, double limit) {
+  return summarize(certificate.bounds, limit);
+}
 
 }  // namespace isowave::core

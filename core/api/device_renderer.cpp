@@ -25,9 +25,9 @@ core::RendererOptions core_options(const RendererOptions &options, std::uint32_t
   return result;
 }
 
-std::unique_ptr<core::Renderer> with_choices(std::unique_ptr<core::Renderer> renderer,
-                                             const RendererOptions &options,
-                                             const core::CompressedVolume &volume, double rate) {
+std::unique_ptr<core::Renderer> add_choices(std::unique_ptr<core::Renderer> renderer,
+                                            const RendererOptions &options,
+                                            const core::CompressedVolume &volume, double rate) {
   if (options.with_bounds)
     renderer = std::make_unique<core::BoundedRenderer>(std::move(renderer), volume, rate);
   if (options.with_time_budget)
@@ -44,9 +44,9 @@ std::unique_ptr<Renderer::Implementation> make_device_implementation(
   const std::lock_guard lock(on.mutex);
   const KernelWatch watch(on.device, before_kernel);
   std::unique_ptr<core::Renderer> renderer =
-      with_choices(std::make_unique<core::DeviceRenderer>(
-                       on.device, compressed, core_options(options, volume->num_levels())),
-                   options, compressed, compressed.rate());
+      add_choices(std::make_unique<core::DeviceRenderer>(
+                      on.device, compressed, core_options(options, volume->num_levels())),
+                  options, compressed, compressed.rate());
   auto result = std::make_unique<CoreImplementation>(
       std::make_shared<std::pair<std::shared_ptr<Device>, std::shared_ptr<const Volume>>>(device,
                                                                                           volume),

@@ -11,9 +11,9 @@ namespace isowave {
 
 core::RendererOptions core_options(const RendererOptions &options, std::uint32_t num_levels);
 /// Around a renderer of a device, what the options ask for.
-std::unique_ptr<core::Renderer> with_choices(std::unique_ptr<core::Renderer> renderer,
-                                             const RendererOptions &options,
-                                             const core::CompressedVolume &volume, double rate);
+std::unique_ptr<core::Renderer> add_choices(std::unique_ptr<core::Renderer> renderer,
+                                            const RendererOptions &options,
+                                            const core::CompressedVolume &volume, double rate);
 /// A renderer of a device. before_kernel: called before each kernel is compiled; what it throws is
 /// thrown here.
 std::unique_ptr<Renderer::Implementation> make_device_implementation(

@@ -4,7 +4,6 @@
 #include <mutex>
 #include <utility>
 
-#include "core/accuracy/certify.hpp"
 #include "core/api/frame_parts.hpp"
 #include "core/api/guarded.hpp"
 #include "core/api/renderer_implementation.hpp"
@@ -69,7 +68,8 @@ Frame CoreImplementation::draw(const FrameRequest &request) {
       return progress.show(pass, request.on_pass);
     };
   }
-  const core::FrameStats stats = renderer_->render(wanted);
+  last_ = {renderer_->render(wanted), {}};
+  const core::FrameStats &stats = last_.stats;
   Frame frame;
   describe_frame(request, stats, frame);
   frame.statistics.errors_are_stated = volume_.errors_are_stated;
@@ -84,7 +84,8 @@ Frame CoreImplementation::draw(const FrameRequest &request) {
   frame.statistics.hits = renderer_->num_hits(stats);
   if (request.want_bounds) {  // last, since it draws frames of its own
     const std::vector<float> depth = request.want_depth ? frame.depth : renderer_->depth();
-    frame.bounds = core::certify(*renderer_, volume_, wanted, depth).bounds;
+    last_.certificate = core::certify(*renderer_, volume_, wanted, depth);
+    frame.bounds = std::move(last_.certificate.bounds);
   }
   return frame;
 }

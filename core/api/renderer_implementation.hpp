@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/accuracy/certify.hpp"
 #include "core/api/turns.hpp"
 #include "core/frame/renderer.hpp"
 #include "core/zfp/zfp_stream.hpp"
@@ -37,6 +38,12 @@ struct Renderer::Implementation {
   std::vector<std::string> notices{};
 };
 
+/// What the program reports of a frame, beside what Frame says.
+struct LastFrame {
+  core::FrameStats stats{};
+  core::Certificate certificate{};  ///< with FrameRequest::want_bounds; its bounds are Frame's
+};
+
 /// Draws by a renderer of core.
 class CoreImplementation : public Renderer::Implementation {
  public:
@@ -55,6 +62,8 @@ class CoreImplementation : public Renderer::Implementation {
   std::string isovalue_notice(double isovalue) const override;
   std::uint64_t memory_bytes() const override { return memory_bytes_; }
   double setup_ms() const override { return renderer_->setup_ms(); }
+  core::Renderer &core() { return *renderer_; }
+  const LastFrame &last() const { return last_; }
 
  private:
   Frame draw(const FrameRequest &request);
@@ -66,6 +75,7 @@ class CoreImplementation : public Renderer::Implementation {
   const core::CompressedVolume &volume_;
   Turns &turns_;
   std::unique_ptr<core::Renderer> renderer_;
+  LastFrame last_;
   std::atomic<std::uint64_t> memory_bytes_ = 0;
 };
 

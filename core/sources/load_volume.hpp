@@ -38,9 +38,6 @@ struct Storage {
   }
 };
 
-/// Opens a reader at the volume's front, each time it is called.
-using OpenReader = std::function<std::unique_ptr<VolumeReader>()>;
-
 /// The precision that was asked for, or the default; none: the rate. May read the whole volume, for
 /// a relative tolerance twice.
 ///

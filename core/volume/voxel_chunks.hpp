@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <span>
 
@@ -23,6 +24,9 @@ inline constexpr float kMaxMagnitude = 0x1p126f;
 inline constexpr float kMinMagnitude = 0x1p-97f;
 
 inline constexpr std::uint32_t kBlockEdge = 4;  ///< voxels
+
+/// Opens a reader at the volume's front, each time it is called.
+using OpenReader = std::function<std::unique_ptr<VolumeReader>()>;
 
 /// A volume that processes read together: of layers that several have, one counts what is found.
 struct VolumePart {

@@ -9,14 +9,15 @@
 #include <string_view>
 
 #include "core/base/error.hpp"
-#include "core/bricks/compress_together.hpp"
 #include "core/bricks/ranks.hpp"
 #include "core/io/atomic_file.hpp"
 #include "core/io/open_volume.hpp"
 #include "core/ocl/device.hpp"
 #include "core/sources/noise_on_device.hpp"
 #include "core/stages/zfp_encode.hpp"
+#include "core/zfp/compress_together.hpp"
 #include "core/zfp/describe_compression.hpp"
+#include "core/zfp/slabs.hpp"
 #include "core/zfp/zfp_accuracy.hpp"
 #include "tools/isowave/commands.hpp"
 #include "tools/isowave/compile_report.hpp"

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "core/base/team.hpp"
-#include "core/bricks/compress_together.hpp"
+#include "core/zfp/shared_file.hpp"
 
 namespace isowave::core::tools {
 

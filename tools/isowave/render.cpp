@@ -1,5 +1,7 @@
 // isowave render: pictures, depth and statistics of isosurfaces, on an OpenCL device, on the
-// devices of several processes, or by the scalar twin.
+// devices of several processes, or by the scalar twin. The library's isowave::Renderer draws them;
+// this file makes the renderer that a command line asks for, and reports more than users of the
+// library see.
 
 #include <fmt/format.h>
 
@@ -10,14 +12,14 @@
 #include <optional>
 #include <utility>
 
-#include "core/accuracy/bounded_renderer.hpp"
-#include "core/accuracy/certify.hpp"
+#include "core/api/device_renderer.hpp"
+#include "core/api/frame_parts.hpp"
+#include "core/api/renderer_implementation.hpp"
 #include "core/base/error.hpp"
 #include "core/base/ms_since.hpp"
 #include "core/bricks/brick_volume.hpp"
 #include "core/bricks/ranks.hpp"
 #include "core/bricks/team_renderer.hpp"
-#include "core/frame/timed_renderer.hpp"
 #include "core/io/file_name.hpp"
 #include "core/io/npy.hpp"
 #include "core/io/png.hpp"
@@ -46,12 +48,13 @@ struct Drawing {
   Team &team;
   Views views{};
   std::vector<Camera> cameras{};
-  Appearance appearance{};
+  isowave::Appearance appearance{};
   std::unique_ptr<ocl::Device> device{};  ///< none with --reference
   std::optional<TeamVolume> bricks{};     ///< of several processes
   CompressedVolume whole{};               ///< of one process
-  std::unique_ptr<Renderer> renderer{};
-  TeamRenderer *of_team = nullptr;  ///< around which `renderer` is, if several processes draw
+  Turns turns{};
+  std::unique_ptr<CoreImplementation> renderer{};
+  TeamRenderer *of_team = nullptr;            ///< in the renderer, if several processes draw
   const DeviceRenderer *on_device = nullptr;  ///< this process's, unless --reference draws
 
   bool is_team() const { return team.size() > 1; }
@@ -106,35 +109,32 @@ void load_bricks(const RenderArgs &options, Drawing &drawing) {
   });
 }
 
-void make_renderer(RenderArgs &options, Drawing &drawing) {
+std::unique_ptr<Renderer> make_core_renderer(RenderArgs &options, Drawing &drawing) {
   const ImageSize size = drawing.views.size;
   options.renderer = to_renderer_options(options.renderer_flags, size);
-  if (options.reference) {
-    drawing.renderer = std::make_unique<TwinRenderer>(drawing.whole, size, options.renderer.solver);
-  } else if (drawing.is_team()) {
-    auto renderer = std::make_unique<TeamRenderer>(*drawing.device, *drawing.bricks,
-                                                   options.renderer, drawing.team);
-    drawing.of_team = renderer.get();
-    drawing.on_device = &renderer->renderer();
-    drawing.renderer = std::move(renderer);
-  } else {
+  if (options.reference)
+    return std::make_unique<TwinRenderer>(drawing.whole, size, options.renderer.solver);
+  if (!drawing.is_team()) {
     auto renderer =
         std::make_unique<DeviceRenderer>(*drawing.device, drawing.whole, options.renderer);
     drawing.on_device = renderer.get();
-    drawing.renderer = std::move(renderer);
+    return renderer;
   }
-  if (drawing.on_device != nullptr) options.renderer = drawing.on_device->options();
+  auto renderer = std::make_unique<TeamRenderer>(*drawing.device, *drawing.bricks, options.renderer,
+                                                 drawing.team);
+  drawing.of_team = renderer.get();
+  drawing.on_device = &renderer->renderer();
+  return renderer;
 }
 
-/// Around the renderer, what chooses the detail, or keeps the time.
-void add_choices(const RenderArgs &options, Drawing &drawing) {
-  if (options.max_surface_error) {
-    const double rate = drawing.bricks ? drawing.bricks->rate : drawing.whole.rate();
-    drawing.renderer =
-        std::make_unique<BoundedRenderer>(std::move(drawing.renderer), drawing.volume(), rate);
-  }
-  if (options.time_budget)
-    drawing.renderer = std::make_unique<TimedRenderer>(std::move(drawing.renderer));
+void make_renderer(RenderArgs &options, Drawing &drawing) {
+  const RendererOptions &wanted = options.renderer_flags.values;
+  drawing.renderer = std::make_unique<CoreImplementation>(
+      nullptr, drawing.volume(), drawing.turns,
+      add_choices(make_core_renderer(options, drawing),
+                  {.with_bounds = wanted.with_bounds, .with_time_budget = wanted.with_kept_picture},
+                  drawing.volume(), drawing.bricks ? drawing.bricks->rate : drawing.whole.rate()));
+  if (drawing.on_device != nullptr) options.renderer = drawing.on_device->options();
 }
 
 /// One frame of the command line, and where its files go.
@@ -147,27 +147,38 @@ struct FrameOfMany {
   fs::path path(const fs::path &name) const {
     return frame_path(name, drawing.cameras.size(), options, isovalue, view);
   }
-  FrameRequest request() const;
-  void write_outputs() const;
-  void report_error(const FrameRequest &drawn, const FrameStats &stats, ordered_json &entry) const;
-  void write_refined(FrameRequest request) const;
+  isowave::FrameRequest request() const;
+  void write_outputs(Frame &frame) const;
+  void report_error(const Frame &frame, ordered_json &entry) const;
+  void write_refined(isowave::FrameRequest request) const;
 };
 
+Image8 image_of(const isowave::ImageSize &size, std::vector<std::uint8_t> picture) {
+  return {size.width, size.height, 3, std::move(picture)};
+}
+
 /// With --progress-dir, the picture after every pass is written.
-FrameRequest FrameOfMany::request() const {
-  FrameRequest request;
-  request.camera = drawing.cameras[view];
-  request.isovalue = drawn_isovalue(drawing.volume(), isovalue);
+isowave::FrameRequest FrameOfMany::request() const {
+  const ImageSize &size = drawing.views.size;
+  isowave::FrameRequest request;
+  request.camera = public_camera(drawing.cameras[view]);
+  request.isovalue = isovalue;
+  request.size = {size.width, size.height, size.samples};
+  request.appearance = drawing.appearance;
   request.voxel_pixels = options.voxel_pixels;
   request.voxel_error = options.frame.voxel_error;
-  request.normals = normals_from_string(options.normals);
+  request.normals = static_cast<isowave::Normals>(normals_from_string(options.normals));
   request.ambient_rays = options.ambient_rays;
   request.max_surface_error = options.max_surface_error;
   request.time_budget_ms = options.time_budget;
+  request.want_picture = !options.image.empty();
+  request.want_depth = !options.depth.empty();
+  request.want_bounds = options.max_surface_error.has_value();
   if (options.progress_dir.empty()) return request;
-  request.on_pass = [this, pass = 0](const PassStats &) mutable {
-    const fs::path name = fs::path(options.progress_dir) / fmt::format("pass{:04}.png", ++pass);
-    const Image8 image = drawing.renderer->shade(drawing.appearance);
+  request.on_pass = [this](const isowave::Progress &progress) {
+    const fs::path name =
+        fs::path(options.progress_dir) / fmt::format("pass{:04}.png", progress.passes());
+    const Image8 image = image_of(progress.size(), progress.picture());
     if (!image.pixels.empty()) write_png(image, path(name));
     return true;
   };
@@ -175,48 +186,37 @@ FrameRequest FrameOfMany::request() const {
 }
 
 /// All ranks: rank 0 writes what it has got.
-void FrameOfMany::write_outputs() const {
-  Renderer &renderer = *drawing.renderer;
-  std::vector<float> depth;
-  Image8 image;
-  if (!options.depth.empty()) depth = renderer.depth();
-  if (!options.image.empty()) image = renderer.shade(drawing.appearance);
+void FrameOfMany::write_outputs(Frame &frame) const {
   together(drawing.team, [&] {
     if (drawing.team.rank() != 0) return;
-    const ImageSize size = drawing.views.size;
-    if (!options.image.empty()) write_png(image, path(options.image));
+    if (!options.image.empty())
+      write_png(image_of(frame.size, std::move(frame.picture)), path(options.image));
     if (!options.depth.empty())
-      write_npy({size.ray_columns(), size.ray_rows(), std::move(depth)}, path(options.depth));
+      write_npy({frame.columns, frame.rows, std::move(frame.depth)}, path(options.depth));
   });
 }
 
 /// With --max-surface-error: how far the frame may be off.
-void FrameOfMany::report_error(const FrameRequest &drawn, const FrameStats &stats,
-                               ordered_json &entry) const {
-  Renderer &renderer = *drawing.renderer;
-  FrameRequest request = with_detail(drawn, stats.detail->detail);
-  request.max_surface_error.reset();
-  const Certificate certificate =
-      certify(renderer, drawing.volume(), request, std::span<const float>(renderer.depth()));
+void FrameOfMany::report_error(const Frame &frame, ordered_json &entry) const {
   together(drawing.team, [&] {
     if (drawing.team.rank() != 0) return;
-    entry["error"] =
-        tools::report_error(*options.max_surface_error, drawing.volume(), *stats.detail,
-                            certificate, drawing.views.size, path(options.error_map));
+    entry["error"] = tools::report_error(*options.max_surface_error, drawing.volume(),
+                                         drawing.renderer->last(), frame, path(options.error_map));
   });
 }
 
 /// --refined: draws the frame once more, however long that takes.
-void FrameOfMany::write_refined(FrameRequest request) const {
-  Renderer &renderer = *drawing.renderer;
+void FrameOfMany::write_refined(isowave::FrameRequest request) const {
   request.time_budget_ms.reset();
-  const FrameStats refined = renderer.render(request);
-  const Image8 image = renderer.shade(drawing.appearance);
+  request.want_picture = true;
+  request.want_depth = false;
+  Frame refined = drawing.renderer->render(request);
   together(drawing.team, [&] {
-    if (drawing.team.rank() == 0) write_png(image, path(options.refined));
+    if (drawing.team.rank() == 0)
+      write_png(image_of(refined.size, std::move(refined.picture)), path(options.refined));
   });
-  fmt::print("  refined: {} rays hit, {:.1f} ms more\n", with_commas(renderer.num_hits(refined)),
-             refined.total_ms);
+  fmt::print("  refined: {} rays hit, {:.1f} ms more\n", with_commas(refined.statistics.hits),
+             refined.statistics.total_ms);
 }
 
 /// Draws one frame and all that is asked of it.
@@ -226,17 +226,17 @@ void FrameOfMany::write_refined(FrameRequest request) const {
 ordered_json draw_frame(const FrameOfMany &frame, ordered_json &own) {
   const RenderArgs &options = frame.options;
   Drawing &drawing = frame.drawing;
-  Renderer &renderer = *drawing.renderer;
   const auto begin = std::chrono::steady_clock::now();
   const double composed_before = drawing.is_team() ? drawing.of_team->composition().ms : 0;
-  const FrameRequest request = frame.request();
-  const FrameStats stats = renderer.render(request);
-  frame.write_outputs();
-  const std::uint64_t num_hits = renderer.num_hits(stats);
-  own = frame_json(frame.isovalue, frame.view, request.camera, stats);
+  const isowave::FrameRequest request = frame.request();
+  Frame drawn = drawing.renderer->render(request);
+  frame.write_outputs(drawn);
+  const std::uint64_t num_hits = drawn.statistics.hits;
+  const LastFrame &last = drawing.renderer->last();
+  own = frame_json(frame.isovalue, frame.view, drawing.cameras[frame.view], last.stats);
   ordered_json entry = own;
   if (drawing.is_team()) {
-    const double ms = ms_since(begin);
+    const double ms = ms_since(begin) - last.certificate.total_ms;
     fmt::print("isovalue {}, view {}: {} rays hit, {} bricks, {:.1f} ms\n", frame.isovalue,
                frame.view, with_commas(num_hits), drawing.team.size(), ms);
     entry = {{"isovalue", frame.isovalue},
@@ -246,11 +246,11 @@ ordered_json draw_frame(const FrameOfMany &frame, ordered_json &own) {
              {"composition_ms", drawing.of_team->composition().ms - composed_before}};
   } else {
     fmt::print("isovalue {}, view {}: {} rays hit, {} passes, {:.1f} ms\n", frame.isovalue,
-               frame.view, with_commas(num_hits), stats.passes.size(), stats.total_ms);
+               frame.view, with_commas(num_hits), last.stats.passes.size(), last.stats.total_ms);
   }
   warn_of_isovalue(drawing.volume(), frame.isovalue);
-  if (options.max_surface_error) frame.report_error(request, stats, entry);
-  if (options.time_budget) entry["time_budget"] = report_steps(stats, *options.time_budget);
+  if (options.max_surface_error) frame.report_error(drawn, entry);
+  if (options.time_budget) entry["time_budget"] = report_steps(last.stats, *options.time_budget);
   if (!options.refined.empty()) frame.write_refined(request);
   return entry;
 }
@@ -344,10 +344,9 @@ void set_up(RenderArgs &options, Drawing &drawing) {
     make_renderer(options, drawing);
   });
   if (compiling) compiling->finish();
-  add_choices(options, drawing);
   const bool fits_surface = options.frame.orbit == 0 && options.frame.cameras.empty();
   if (fits_surface) {
-    drawing.cameras = {drawing.renderer->camera(
+    drawing.cameras = {drawing.renderer->core().camera(
         drawn_isovalues(drawing.volume(), options.frame.isovalues), drawing.views.size)};
   }
   if (options.parallel)

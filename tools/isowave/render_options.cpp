@@ -20,7 +20,7 @@ namespace isowave::core::tools {
 
 namespace fs = std::filesystem;
 
-glm::vec3 parse_color(const char *option, const std::string &text) {
+std::array<float, 3> parse_color(const char *option, const std::string &text) {
   std::uint32_t rgb = 0;
   const char *end = text.data() + text.size();
   if (text.size() == 7 && text[0] == '#') {

@@ -2,9 +2,9 @@
 // The options of `render`: what they ask for, what of it cannot be, and the names of its files.
 
 #include <CLI/CLI.hpp>
+#include <array>
 #include <cstdint>
 #include <filesystem>
-#include <glm/glm.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -38,7 +38,7 @@ struct RenderArgs {
 void add_render_options(CLI::App &command, RenderArgs &options);
 
 /// "#RRGGBB" -> [0,1]^3.
-glm::vec3 parse_color(const char *option, const std::string &text);
+std::array<float, 3> parse_color(const char *option, const std::string &text);
 
 /// The name of a frame's file: the name as given for a single frame, else NAME_isoV_viewK.EXT.
 /// Empty for an empty name.

@@ -43,9 +43,11 @@ nlohmann::ordered_json report_steps(const FrameStats &stats, double budget_ms) {
 }
 
 nlohmann::ordered_json report_error(double max_surface_error, const CompressedVolume &volume,
-                                    const DetailChoice &choice, const Certificate &certificate,
-                                    const ImageSize &size, const std::filesystem::path &error_map) {
-  const CertificateSummary summary = summarize(certificate, max_surface_error);
+                                    const LastFrame &last, const Frame &frame,
+                                    const std::filesystem::path &error_map) {
+  const DetailChoice &choice = last.stats.detail.value();
+  const Certificate &certificate = last.certificate;
+  const CertificateSummary summary = summarize(frame.bounds, max_surface_error);
   const double certified = summary.num_pixels == 0
                                ? 100.0
                                : 100.0 * double(summary.num_certified) / double(summary.num_pixels);
@@ -65,8 +67,7 @@ nlohmann::ordered_json report_error(double max_surface_error, const CompressedVo
     warn(fmt::format("most pixels cannot be kept within {} pixels: {}", max_surface_error,
                      choice.advice));
   }
-  if (!error_map.empty())
-    write_npy({size.ray_columns(), size.ray_rows(), certificate.bounds}, error_map);
+  if (!error_map.empty()) write_npy({frame.columns, frame.rows, frame.bounds}, error_map);
   nlohmann::ordered_json tries = nlohmann::ordered_json::array();
   for (const DetailChoice::Try &each : choice.tries) {
     tries.push_back(detail_json(each.detail));

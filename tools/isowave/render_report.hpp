@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "core/accuracy/certify.hpp"
+#include "core/api/renderer_implementation.hpp"
 #include "core/frame/frame_stats.hpp"
 #include "core/render/memory_plan.hpp"
 #include "core/zfp/zfp_stream.hpp"
@@ -15,11 +15,11 @@ namespace isowave::core::tools {
 
 /// Prints the steps of a frame within a time budget. Returns their JSON.
 nlohmann::ordered_json report_steps(const FrameStats &stats, double budget_ms);
-/// Prints how far a frame of that size may be off, and writes it to error_map, if that is not
+/// Prints how far the last frame may be off, and writes its bounds to error_map, if that is not
 /// empty. Returns its JSON.
 nlohmann::ordered_json report_error(double max_surface_error, const CompressedVolume &volume,
-                                    const DetailChoice &choice, const Certificate &certificate,
-                                    const ImageSize &size, const std::filesystem::path &error_map);
+                                    const LastFrame &last, const Frame &frame,
+                                    const std::filesystem::path &error_map);
 /// Prints the plan of the device's memory.
 void print_plan(const MemoryPlan &plan, const CompressedVolume &volume);
 

@@ -1,8 +1,7 @@
-#include "core/bricks/compress_together.hpp"
+#include "core/zfp/compress_together.hpp"
 
 #include <algorithm>
 #include <bit>
-#include <exception>
 #include <functional>
 #include <numeric>
 #include <optional>
@@ -11,11 +10,12 @@
 #include <vector>
 
 #include "core/base/error.hpp"
-#include "core/bricks/brick_volume.hpp"
 #include "core/volume/pyramid.hpp"
 #include "core/zfp/level_bounds.hpp"
 #include "core/zfp/libzfp.hpp"
 #include "core/zfp/pyramid_coder.hpp"
+#include "core/zfp/slabs.hpp"
+#include "core/zfp/team_list.hpp"
 #include "core/zfp/zfp_file.hpp"
 #include "core/zfp/zfp_trailer.hpp"
 
@@ -23,139 +23,12 @@ namespace isowave::core {
 
 namespace {
 
-/// From one to the other, not included: of layers of blocks, or of voxels.
-struct Layers {
-  std::uint32_t begin = 0, end = 0;
-
-  std::uint32_t count() const { return end - begin; }
-  bool empty() const { return begin == end; }
-};
-
-Layers common(const Layers &a, const Layers &b) {
-  const std::uint32_t begin = std::max(a.begin, b.begin);
-  return {begin, std::max(begin, std::min(a.end, b.end))};
-}
-
-/// Some layers of a reader's.
-class LayersReader : public VolumeReader {
- public:
-  LayersReader(std::unique_ptr<VolumeReader> whole, const Layers &layers)
-      : whole_(std::move(whole)), begin_(layers.begin) {
-    info_ = whole_->info();
-    info_.dims.z = layers.count();
-  }
-  void read_layers(std::uint32_t z_begin, std::uint32_t num_layers, std::span<float> out) override {
-    whole_->read_layers(begin_ + z_begin, num_layers, out);
-  }
-  void read_exact_layers(std::uint32_t z_begin, std::uint32_t num_layers,
-                         std::span<double> out) override {
-    whole_->read_exact_layers(begin_ + z_begin, num_layers, out);
-  }
-
- private:
-  std::unique_ptr<VolumeReader> whole_;
-  std::uint32_t begin_;
-};
-
-/// How a level is cut into slabs.
-struct LevelCuts {
-  /// Layers of blocks of each rank's slab, and those that it works on: with as many of its
-  /// neighbours' as the next level's slab depends on.
-  std::vector<Layers> own, worked;
-};
-
-std::uint32_t block_layers(const VolumeInfo &info) {
-  return (info.dims.z + 3) / 4;
-}
-
-/// Layers of voxels in these layers of blocks of a level.
-Layers voxel_layers(const VolumeInfo &info, const Layers &blocks) {
-  return {std::min(4 * blocks.begin, info.dims.z), std::min(4 * blocks.end, info.dims.z)};
-}
-
-std::vector<Layers> share_out(std::uint32_t layers, std::uint32_t size) {
-  std::vector<Layers> shares;
-  for (std::uint64_t rank = 0; rank < size; ++rank) {
-    shares.push_back({static_cast<std::uint32_t>(layers * rank / size),
-                      static_cast<std::uint32_t>(layers * (rank + 1) / size)});
-  }
-  return shares;
-}
-
-/// Cuts all levels into slabs. A block of the next level belongs to the rank that has its first
-/// fine block, or else the first one behind that. The rank must also know, as the whole volume
-/// would give them, the blocks before and behind its own, and the layers of voxels of this level
-/// that these are made of.
-std::vector<LevelCuts> cut_levels(std::span<CompressedVolume *const> levels, std::uint32_t size) {
-  constexpr std::uint32_t kAround = 4;
-  std::vector<LevelCuts> cuts = {{share_out(block_layers(levels[0]->info), size), {}}};
-  for (std::size_t i = 0; i < levels.size(); ++i) {
-    const std::uint32_t total = block_layers(levels[i]->info);
-    if (i + 1 == levels.size()) {
-      cuts[i].worked = cuts[i].own;
-      break;
-    }
-    const std::uint32_t next_total = block_layers(levels[i + 1]->info);
-    const auto half = [&](std::uint32_t b) { return b == total ? next_total : (b + 1) / 2; };
-    LevelCuts next;
-    for (const Layers &own : cuts[i].own) {
-      const Layers coarse = {half(own.begin), half(own.end)};
-      next.own.push_back(coarse);
-      Layers worked = own;
-      if (!coarse.empty()) {
-        worked.begin = 2 * coarse.begin - std::min(2 * coarse.begin, kAround);
-        worked.end = std::min(total, std::max(own.end, 2 * coarse.end + kAround));
-      }
-      cuts[i].worked.push_back(worked);
-    }
-    cuts.push_back(std::move(next));
-  }
-  return cuts;
-}
-
-/// Consecutive bytes of a file, and their checksum.
-struct Section {
-  std::uint64_t bytes = 0;
-  std::uint32_t crc = 0;
-
-  void add(std::span<const std::byte> more) {
-    crc = update_crc(crc, more);
-    bytes += more.size();
-  }
-  void add(const Section &behind) {
-    crc = combine_crcs(crc, behind.crc, behind.bytes);
-    bytes += behind.bytes;
-  }
-};
-
-/// Writes one section of a shared file.
-class SectionWriter {
- public:
-  SectionWriter(SharedFile &file, std::uint64_t begin) : file_(file), begin_(begin) {}
-  void write(std::span<const std::byte> bytes) {
-    if (bytes.empty()) return;
-    file_.write(begin_ + section_.bytes, bytes);
-    section_.add(bytes);
-  }
-  const Section &section() const { return section_; }
-
- private:
-  SharedFile &file_;
-  std::uint64_t begin_;
-  Section section_;
-};
-
-/// Bytes of a list that one rank has.
-struct Stretch {
-  std::uint32_t rank;
-  std::uint64_t begin, end;  ///< in the list
-};
-
 /// What a rank's slab of a level becomes.
 struct CodedSlab {
   CompressedVolume volume;                 ///< of the layers worked on
   std::vector<float> errors;               ///< of its own blocks, where they are kept
   std::optional<SectionWriter> payload{};  ///< its own, at a fixed rate
+  std::uint64_t payload_bytes = 0;         ///< that were coded, its own or not
 };
 
 /// A level on its way from one step to the next.
@@ -165,11 +38,14 @@ struct LevelData {
   std::vector<float> decoded;  ///< of its own blocks
 };
 
-/// The values of layers `some` from a list with per_layer values for each layer of `all`.
-template <class Value>
-std::span<Value> part_of(std::span<Value> values, std::size_t per_layer, const Layers &all,
-                         const Layers &some) {
-  return values.subspan((some.begin - all.begin) * per_layer, some.count() * per_layer);
+/// That many layers of voxels of a level, not coded yet.
+CompressedVolume slab_of(const CompressedVolume &level, std::uint32_t layers) {
+  CompressedVolume slab;
+  slab.info = level.info;
+  slab.info.dims.z = layers;
+  slab.bits_per_block = level.bits_per_block;
+  slab.precision = level.precision;
+  return slab;
 }
 
 class TeamCompressor {
@@ -179,17 +55,19 @@ class TeamCompressor {
       : team_(team), open_(open), options_(options), file_(file) {
     levels_.push_back(&volume);
     for (CompressedVolume &level : volume.coarser_levels) levels_.push_back(&level);
-    cuts_ = cut_levels(levels_, team.size());
+    std::vector<VolumeInfo> grids;
+    for (const CompressedVolume *level : levels_) grids.push_back(level->info);
+    cuts_ = cut_levels(grids, team.size());
   }
 
   void run() {
-    Section all;
+    FileSection all;
     ZfpLayout layout;
     for (level_ = 0; level_ < levels_.size(); ++level_) {
       const std::uint64_t begin = all.bytes;
       LevelData next;
       CodedSlab slab = code(begin, next);
-      Section section = write_payload(begin, slab);
+      FileSection section = write_payload(begin, slab);
       ZfpLayout own_layout;
       section.add(write_tables(begin + section.bytes, section.bytes, slab, own_layout));
       if (level_ == 0) {
@@ -208,14 +86,20 @@ class TeamCompressor {
 
  private:
   CompressedVolume &level() { return *levels_[level_]; }
-  const Layers &own() const { return cuts_[level_].own[team_.rank()]; }
-  const Layers &worked() const { return cuts_[level_].worked[team_.rank()]; }
+  /// Whether this rank has a part of the next level.
+  bool has_next() const {
+    return level_ + 1 < levels_.size() && !cuts_[level_ + 1].own[team_.rank()].empty();
+  }
+  const LayerRange &own() const { return cuts_[level_].own[team_.rank()]; }
+  const LayerRange &worked() const { return cuts_[level_].worked[team_.rank()]; }
   bool is_first() const { return team_.rank() == 0; }
   /// Number of blocks in a layer of the level.
   std::size_t blocks_of_layer(std::size_t level) const {
     const glm::uvec3 blocks = levels_[level]->num_blocks();
     return std::size_t{blocks.x} * blocks.y;
   }
+  /// Payload of a layer of the level's blocks, at a fixed rate.
+  std::size_t layer_bytes() { return blocks_of_layer(level_) * level().bits_per_block / 8; }
   std::size_t voxels_of_layer(std::size_t level) const {
     const glm::uvec3 &dims = levels_[level]->info.dims;
     return std::size_t{dims.x} * dims.y;
@@ -224,20 +108,21 @@ class TeamCompressor {
   CodedSlab code(std::uint64_t begin, LevelData &next);
   void read_finest(PyramidCoder &coder);
   void keep_next(const Chunk &chunk, LevelData &next) const;
+  void take_payload(std::span<const std::byte> payload, CodedSlab &slab);
+  void code_made(const glm::uvec3 &dims, PyramidCoder &coder);
+  LevelData empty_next() const;
+  void keep_bounds(const LevelBounds::Off &off, const VolumeInfo &made, LevelData &next) const;
   void agree_on_error(const CodedSlab &slab);
-  Section write_payload(std::uint64_t begin, const CodedSlab &slab);
-  Section write_bits(std::uint64_t begin, const CompressedVolume &coded);
-  Section write_tables(std::uint64_t begin, std::uint64_t size, const CodedSlab &slab,
-                       ZfpLayout &layout);
+  FileSection write_payload(std::uint64_t begin, const CodedSlab &slab);
+  FileSection write_bits(std::uint64_t begin, const CompressedVolume &coded);
+  FileSection write_tables(std::uint64_t begin, std::uint64_t size, const CodedSlab &slab,
+                           ZfpLayout &layout);
   std::uint64_t write_list(SectionWriter &out, std::span<const std::byte> own,
                            std::size_t item_size);
   std::uint64_t write_no_data(SectionWriter &out, const CodedSlab &slab);
-  std::uint64_t write_deflated(SectionWriter &out, std::span<const Stretch> stretches,
-                               std::span<const std::span<const std::byte>> own,
-                               std::size_t piece_size);
-  Section write_trailer(std::uint64_t begin, const Section &before, const ZfpLayout &layout,
-                        bool has_levels);
-  Section of_first(const std::function<Section()> &write);
+  FileSection write_trailer(std::uint64_t begin, const FileSection &before, const ZfpLayout &layout,
+                            bool has_levels);
+  FileSection of_first(const std::function<FileSection()> &write);
   void fetch_neighbours();
 
   Team &team_;
@@ -251,12 +136,12 @@ class TeamCompressor {
 };
 
 /// Rank 0 writes, and all get to know what.
-Section TeamCompressor::of_first(const std::function<Section()> &write) {
-  Section section;
+FileSection TeamCompressor::of_first(const std::function<FileSection()> &write) {
+  FileSection section;
   together(team_, [&] {
     if (is_first()) section = write();
   });
-  return gather(team_, is_first() ? std::vector{section} : std::vector<Section>()).front();
+  return gather(team_, is_first() ? std::vector{section} : std::vector<FileSection>()).front();
 }
 
 /// The next level's layers that are this rank's own.
@@ -264,7 +149,8 @@ void TeamCompressor::keep_next(const Chunk &chunk, LevelData &next) const {
   const LevelCuts &cuts = cuts_[level_ + 1];
   const VolumeInfo &info = levels_[level_ + 1]->info;
   const std::uint32_t rank = team_.rank(), first = 2 * worked().begin + chunk.z;
-  const Layers kept = common(voxel_layers(info, cuts.own[rank]), {first, first + chunk.num_layers});
+  const LayerRange kept =
+      common_layers(voxel_layers(info, cuts.own[rank]), {first, first + chunk.num_layers});
   const std::uint32_t begin = voxel_layers(info, cuts.worked[rank]).begin;
   const std::size_t size = voxels_of_layer(level_ + 1);
   for (std::uint32_t z = kept.begin; z < kept.end; ++z)
@@ -274,7 +160,7 @@ void TeamCompressor::keep_next(const Chunk &chunk, LevelData &next) const {
 
 void TeamCompressor::read_finest(PyramidCoder &coder) {
   VolumePart part = own_part(team_, level().info);
-  const Layers layers = voxel_layers(level().info, worked());
+  const LayerRange layers = voxel_layers(level().info, worked());
   part.begin = layers.begin;
   InputOptions input = input_of(options_);
   input.part = &part;
@@ -284,54 +170,22 @@ void TeamCompressor::read_finest(PyramidCoder &coder) {
 
 /// Codes the layers worked on; at a fixed rate, writes what is the rank's own.
 CodedSlab TeamCompressor::code(std::uint64_t begin, LevelData &next) {
-  const std::uint32_t rank = team_.rank();
-  const bool has_next = level_ + 1 < levels_.size() && !cuts_[level_ + 1].own[rank].empty();
   CompressOptions options = options_;
   if (worked().empty()) options.encoder = {};
   CodedSlab slab;
   CompressedVolume coarse;
   std::optional<PyramidCoder> coder;
   std::vector<CompressedVolume *> volumes = {&slab.volume};
-  const auto describe = [](const CompressedVolume &level) {
-    CompressedVolume volume;
-    volume.info = level.info;
-    volume.bits_per_block = level.bits_per_block;
-    volume.precision = level.precision;
-    return volume;
-  };
-  std::uint64_t done = 0;  // bytes of payload
-  const std::size_t layer_bytes = blocks_of_layer(level_) * level().bits_per_block / 8;
-  const std::uint64_t own_begin = (own().begin - worked().begin) * layer_bytes,
-                      own_end = (own().end - worked().begin) * layer_bytes;
   const std::vector<PayloadSink> sinks = {
-      [&](std::span<const std::byte> payload) {
-        if (level().is_indexed()) {
-          std::vector<std::uint32_t> &words = slab.volume.words;
-          const std::size_t size = words.size();
-          words.resize(size + payload.size() / sizeof(std::uint32_t));
-          std::ranges::copy(payload, std::as_writable_bytes(std::span(words)).begin() +
-                                         std::ptrdiff_t(size * sizeof(std::uint32_t)));
-          return;
-        }
-        const std::uint64_t from = std::max(done, own_begin),
-                            to = std::min(done + payload.size(), own_end);
-        if (from < to) slab.payload->write(payload.subspan(from - done, to - from));
-        done += payload.size();
-      },
+      [&](std::span<const std::byte> payload) { take_payload(payload, slab); },
       [](std::span<const std::byte>) {}};
   together(team_, [&] {
-    slab.volume = describe(level());
-    slab.volume.info.dims.z = voxel_layers(level().info, worked()).count();
-    slab.payload.emplace(file_, begin + sizeof(ZfpHeader) + own().begin * layer_bytes);
-    if (has_next) {
-      coarse = describe(*levels_[level_ + 1]);
-      coarse.info.dims.z = slab.volume.info.dims.z / 2 + 1;
+    slab.volume = slab_of(level(), voxel_layers(level().info, worked()).count());
+    slab.payload.emplace(file_, begin + sizeof(ZfpHeader) + own().begin * layer_bytes());
+    if (has_next()) {
+      coarse = slab_of(*levels_[level_ + 1], slab.volume.info.dims.z / 2 + 1);
       volumes.push_back(&coarse);
-      const LevelCuts &cuts = cuts_[level_ + 1];
-      const VolumeInfo &info = levels_[level_ + 1]->info;
-      next.voxels.resize(voxel_layers(info, cuts.worked[rank]).count() *
-                         voxels_of_layer(level_ + 1));
-      next.made.resize(cuts.worked[rank].count() * blocks_of_layer(level_ + 1));
+      next = empty_next();
     }
     coder.emplace(options, volumes, std::span(sinks).first(volumes.size()), level_ == 0,
                   level_ == 0 && levels_.size() > 1,
@@ -339,39 +193,81 @@ CodedSlab TeamCompressor::code(std::uint64_t begin, LevelData &next) {
   });
   if (level_ == 0) read_finest(*coder);
   together(team_, [&] {
-    const glm::uvec3 &dims = slab.volume.info.dims;
-    const std::uint32_t chunk_layers = layers_per_chunk(dims);
-    const std::size_t layer = voxels_of_layer(level_);
-    for (std::uint32_t z = 0; level_ > 0 && z < dims.z; z += chunk_layers) {
-      const std::size_t count = std::min(chunk_layers, dims.z - z) * layer;
-      code_chunk(make_chunk(dims, z, std::span(data_.voxels).subspan(z * layer, count)), dims,
-                 input_of_coarser(options), *coder);
-    }
+    if (level_ > 0) code_made(slab.volume.info.dims, *coder);
     slab.errors = coder->finish_level();
     if (!slab.errors.empty()) {
       const std::span<const float> errors =
-          part_of(std::span<const float>(slab.errors), blocks_of_layer(level_), worked(), own());
+          values_of(std::span<const float>(slab.errors), blocks_of_layer(level_), worked(), own());
       slab.errors = std::vector<float>(errors.begin(), errors.end());
     }
-    if (!has_next) return;
-    LevelBounds::Off off = coder->finish_bounds(data_.made);
-    if (off.made.empty()) {
-      next.made.clear();
-      return;
-    }
-    const LevelCuts &cuts = cuts_[level_ + 1];
-    const std::size_t per_layer = blocks_of_layer(level_ + 1);
-    const Layers made = {worked().begin / 2, worked().begin / 2 + block_layers(coarse.info)};
-    const std::span<float> of_own = part_of(std::span(off.made), per_layer, made, cuts.own[rank]);
-    std::ranges::copy(
-        of_own,
-        part_of(std::span(next.made), per_layer, cuts.worked[rank], cuts.own[rank]).begin());
-    const std::span<float> decoded =
-        part_of(std::span(off.decoded), per_layer, made, cuts.own[rank]);
-    next.decoded.assign(decoded.begin(), decoded.end());
+    if (has_next()) keep_bounds(coder->finish_bounds(data_.made), coarse.info, next);
   });
   agree_on_error(slab);
   return slab;
+}
+
+/// Keeps payload in memory where blocks have lengths of their own, since their place is not known
+/// yet; at a fixed rate, writes what is the rank's own.
+void TeamCompressor::take_payload(std::span<const std::byte> payload, CodedSlab &slab) {
+  if (level().is_indexed()) {
+    std::vector<std::uint32_t> &words = slab.volume.words;
+    const std::size_t size = words.size();
+    words.resize(size + payload.size() / sizeof(std::uint32_t));
+    std::ranges::copy(payload, std::as_writable_bytes(std::span(words)).begin() +
+                                   std::ptrdiff_t(size * sizeof(std::uint32_t)));
+    return;
+  }
+  const std::uint64_t done = slab.payload_bytes,
+                      own_begin = (own().begin - worked().begin) * layer_bytes(),
+                      own_end = (own().end - worked().begin) * layer_bytes(),
+                      from = std::max(done, own_begin),
+                      to = std::min(done + payload.size(), own_end);
+  if (from < to) slab.payload->write(payload.subspan(from - done, to - from));
+  slab.payload_bytes += payload.size();
+}
+
+/// Codes the voxels of a coarser level, which were made of the finer one's.
+void TeamCompressor::code_made(const glm::uvec3 &dims, PyramidCoder &coder) {
+  const std::uint32_t chunk_layers = layers_per_chunk(dims);
+  const std::size_t layer = voxels_of_layer(level_);
+  for (std::uint32_t z = 0; z < dims.z; z += chunk_layers) {
+    const std::size_t count = std::min(chunk_layers, dims.z - z) * layer;
+    code_chunk(make_chunk(dims, z, std::span(data_.voxels).subspan(z * layer, count)), dims,
+               input_of_coarser(options_), coder);
+  }
+}
+
+/// Room for the next level's layers that this rank works on.
+LevelData TeamCompressor::empty_next() const {
+  const LayerRange &worked = cuts_[level_ + 1].worked[team_.rank()];
+  LevelData next;
+  next.voxels.resize(voxel_layers(levels_[level_ + 1]->info, worked).count() *
+                     voxels_of_layer(level_ + 1));
+  next.made.resize(worked.count() * blocks_of_layer(level_ + 1));
+  return next;
+}
+
+/// Keeps how far the next level's blocks that are this rank's own are from the source.
+///
+/// made  the grid of the blocks that `off` is of
+void TeamCompressor::keep_bounds(const LevelBounds::Off &off, const VolumeInfo &made,
+                                 LevelData &next) const {
+  if (off.made.empty()) {
+    next.made.clear();
+    return;
+  }
+  const std::uint32_t rank = team_.rank(), first = worked().begin / 2;
+  const LayerRange &next_own = cuts_[level_ + 1].own[rank];
+  const std::size_t per_layer = blocks_of_layer(level_ + 1);
+  const auto of_own = [&](const std::vector<float> &values) {
+    return values_of(std::span(values), per_layer, {first, first + num_block_layers(made)},
+                     next_own);
+  };
+  std::ranges::copy(
+      of_own(off.made),
+      values_of(std::span(next.made), per_layer, cuts_[level_ + 1].worked[rank], next_own).begin());
+  const std::span<const float> decoded = of_own(off.decoded);
+  next.decoded.assign(decoded.begin(), decoded.end());
 }
 
 void TeamCompressor::agree_on_error(const CodedSlab &slab) {
@@ -383,23 +279,23 @@ void TeamCompressor::agree_on_error(const CodedSlab &slab) {
   if (volume.is_indexed()) volume.precision.max_voxel_error = volume.max_voxel_error;
 }
 
-Section TeamCompressor::write_payload(std::uint64_t begin, const CodedSlab &slab) {
-  Section section = of_first([&] {
+FileSection TeamCompressor::write_payload(std::uint64_t begin, const CodedSlab &slab) {
+  FileSection section = of_first([&] {
     SectionWriter out(file_, begin);
     const ZfpHeader header =
         make_zfp_header(level().info.dims, level().bits_per_block, level().precision.min_exponent);
     out.write(std::as_bytes(std::span(header)));
     return out.section();
   });
-  const Section own = level().is_indexed() ? write_bits(begin + section.bytes, slab.volume)
-                                           : slab.payload->section();
-  for (const Section &of_rank : gather(team_, std::vector{own})) section.add(of_rank);
+  const FileSection own = level().is_indexed() ? write_bits(begin + section.bytes, slab.volume)
+                                               : slab.payload->section();
+  for (const FileSection &of_rank : gather(team_, std::vector{own})) section.add(of_rank);
   return section;
 }
 
 /// A slab's bits at their place in a payload. A byte that several ranks have bits of is written by
 /// the one that has its first.
-Section TeamCompressor::write_bits(std::uint64_t begin, const CompressedVolume &coded) {
+FileSection TeamCompressor::write_bits(std::uint64_t begin, const CompressedVolume &coded) {
   struct Bits {
     std::uint64_t first, count;  ///< in the payload
     std::uint64_t in_first_byte;
@@ -443,8 +339,8 @@ Section TeamCompressor::write_bits(std::uint64_t begin, const CompressedVolume &
 /// Writes what follows a level's stream: padding, index, bounds, voxels without data.
 ///
 /// size  of the stream [bytes]
-Section TeamCompressor::write_tables(std::uint64_t begin, std::uint64_t size, const CodedSlab &slab,
-                                     ZfpLayout &layout) {
+FileSection TeamCompressor::write_tables(std::uint64_t begin, std::uint64_t size,
+                                         const CodedSlab &slab, ZfpLayout &layout) {
   const std::uint64_t layer = blocks_of_layer(level_), num_own = own().count() * layer,
                       first = (own().begin - worked().begin) * layer;
   std::vector<std::uint16_t> lengths;
@@ -468,7 +364,8 @@ Section TeamCompressor::write_tables(std::uint64_t begin, std::uint64_t size, co
   if (!largest.empty())
     layout.bounds_bytes = write_list(out, std::as_bytes(std::span(coded.codes)), 1);
   layout.no_data_bytes = write_no_data(out, slab);
-  return gather(team_, is_first() ? std::vector{out.section()} : std::vector<Section>()).front();
+  return gather(team_, is_first() ? std::vector{out.section()} : std::vector<FileSection>())
+      .front();
 }
 
 /// A list with an item for each block. Returns its size as written, at rank 0.
@@ -477,10 +374,10 @@ std::uint64_t TeamCompressor::write_list(SectionWriter &out, std::span<const std
   const std::uint64_t per_layer = blocks_of_layer(level_) * item_size;
   std::vector<Stretch> stretches;
   for (std::uint32_t rank = 0; rank < team_.size(); ++rank) {
-    const Layers &slab = cuts_[level_].own[rank];
+    const LayerRange &slab = cuts_[level_].own[rank];
     stretches.push_back({rank, slab.begin * per_layer, slab.end * per_layer});
   }
-  return write_deflated(out, stretches, {{own_bytes}}, kDeflatedAtOnce * item_size);
+  return write_deflated(team_, out, stretches, {{own_bytes}}, kDeflatedAtOnce * item_size);
 }
 
 /// The level's voxels without data, and how many they are. A group of blocks that several ranks
@@ -537,7 +434,7 @@ std::uint64_t TeamCompressor::write_no_data(SectionWriter &out, const CodedSlab 
                           kMaskBytes = sizeof(std::uint64_t);
   std::vector<Stretch> stretches;
   for (std::uint32_t rank = 0; rank < team_.size(); ++rank) {
-    const Layers &of = cuts_[level_].own[rank];
+    const LayerRange &of = cuts_[level_].own[rank];
     stretches.push_back({rank, kGroupBytes * num_groups(of.begin * layer),
                          kGroupBytes * num_groups(of.end * layer)});
   }
@@ -545,70 +442,13 @@ std::uint64_t TeamCompressor::write_no_data(SectionWriter &out, const CodedSlab 
     const std::uint64_t begin = stretches.back().end;
     stretches.push_back({rank, begin, begin + kMaskBytes * of_ranks[rank].num_masks});
   }
-  return write_deflated(out, stretches,
+  return write_deflated(team_, out, stretches,
                         {{std::as_bytes(std::span(groups)), std::as_bytes(std::span(masks))}},
                         kDeflatedAtOnce * sizeof(std::uint32_t));
 }
 
-/// Writes a deflated list that consists of stretches. Rank 0 receives them piece by piece.
-///
-/// own      this rank's stretches, in the order of the list
-/// Returns  at rank 0, the size as written [bytes]
-std::uint64_t TeamCompressor::write_deflated(SectionWriter &out, std::span<const Stretch> stretches,
-                                             std::span<const std::span<const std::byte>> own,
-                                             std::size_t piece_size) {
-  const std::uint64_t begin = out.section().bytes, total = stretches.back().end;
-  together(team_, [&] {
-    std::exception_ptr failure;
-    std::optional<Deflater> deflater;
-    std::vector<std::byte> piece(is_first() ? piece_size : 0);
-    // Others send what they have, whatever fails here.
-    const auto attempt = [&](const auto &work) {
-      if (failure) return;
-      try {
-        work();
-      } catch (...) {
-        failure = std::current_exception();
-      }
-    };
-    if (is_first()) {
-      attempt(
-          [&] { deflater.emplace([&](std::span<const std::byte> bytes) { out.write(bytes); }); });
-    }
-    for (std::uint64_t at = 0; at < total; at += piece_size) {
-      const std::uint64_t end = std::min(at + piece_size, total);
-      std::vector<Incoming> received;
-      auto next_own = own.begin();
-      for (const Stretch &stretch : stretches) {
-        const bool is_own = stretch.rank == team_.rank();
-        const std::span<const std::byte> bytes =
-            is_own ? *next_own++ : std::span<const std::byte>();
-        const std::uint64_t from = std::max(at, stretch.begin), to = std::min(end, stretch.end);
-        if (from >= to) continue;
-        if (is_own) {
-          const std::span<const std::byte> some = bytes.subspan(from - stretch.begin, to - from);
-          if (is_first()) {
-            std::ranges::copy(some, piece.begin() + std::ptrdiff_t(from - at));
-          } else {
-            const Outgoing sent{0, some};
-            team_.exchange({&sent, 1}, {});
-          }
-        } else if (is_first()) {
-          received.push_back({stretch.rank, std::span(piece).subspan(from - at, to - from)});
-        }
-      }
-      if (!is_first()) continue;
-      team_.exchange({}, received);
-      attempt([&] { deflater->add(std::span(piece).first(end - at)); });
-    }
-    if (is_first()) attempt([&] { deflater->finish(); });
-    if (failure) std::rethrow_exception(failure);
-  });
-  return out.section().bytes - begin;
-}
-
-Section TeamCompressor::write_trailer(std::uint64_t begin, const Section &before,
-                                      const ZfpLayout &layout, bool has_levels) {
+FileSection TeamCompressor::write_trailer(std::uint64_t begin, const FileSection &before,
+                                          const ZfpLayout &layout, bool has_levels) {
   return of_first([&] {
     const std::string text = zfp_trailer_text(level(), layout);
     ZfpFooter footer{zfp_version(level(), has_levels), std::uint32_t(text.size()), before.crc, 0,
@@ -627,19 +467,20 @@ void TeamCompressor::fetch_neighbours() {
   const LevelCuts &cuts = cuts_[next];
   const VolumeInfo &info = levels_[next]->info;
   const std::uint32_t self = team_.rank();
-  const auto slices = [&](const Layers &some, const auto &use) {
-    const Layers all = cuts.worked[self];
-    use(std::as_writable_bytes(part_of(std::span(data_.voxels), voxels_of_layer(next),
-                                       voxel_layers(info, all), voxel_layers(info, some))));
+  const auto slices = [&](const LayerRange &some, const auto &use) {
+    const LayerRange all = cuts.worked[self];
+    use(std::as_writable_bytes(values_of(std::span(data_.voxels), voxels_of_layer(next),
+                                         voxel_layers(info, all), voxel_layers(info, some))));
     if (!data_.made.empty())
-      use(std::as_writable_bytes(part_of(std::span(data_.made), blocks_of_layer(next), all, some)));
+      use(std::as_writable_bytes(
+          values_of(std::span(data_.made), blocks_of_layer(next), all, some)));
   };
   std::vector<Outgoing> sent;
   std::vector<Incoming> received;
   for (std::uint32_t rank = 0; rank < team_.size(); ++rank) {
     if (rank == self) continue;
-    const Layers for_it = common(cuts.own[self], cuts.worked[rank]),
-                 for_us = common(cuts.own[rank], cuts.worked[self]);
+    const LayerRange for_it = common_layers(cuts.own[self], cuts.worked[rank]),
+                     for_us = common_layers(cuts.own[rank], cuts.worked[self]);
     if (!for_it.empty())
       slices(for_it, [&](std::span<std::byte> bytes) { sent.push_back({rank, bytes}); });
     if (!for_us.empty())
@@ -649,20 +490,6 @@ void TeamCompressor::fetch_neighbours() {
 }
 
 }  // namespace
-
-VolumePart own_part(Team &team, const VolumeInfo &whole) {
-  const Layers own = voxel_layers(whole, share_out(block_layers(whole), team.size())[team.rank()]);
-  return {&team, whole, own.begin, own.begin, own.end};
-}
-
-std::unique_ptr<VolumeReader> open_part(const VolumePart &part, std::uint32_t num_layers,
-                                        const OpenReader &open) {
-  std::unique_ptr<VolumeReader> reader;
-  together(*part.team, [&] {
-    reader = std::make_unique<LayersReader>(open(), Layers{part.begin, part.begin + num_layers});
-  });
-  return reader;
-}
 
 CompressedVolume compress_together(Team &team, const OpenReader &open,
                                    const CompressOptions &options, SharedFile &file) {
