@@ -7,7 +7,7 @@
 /// of the camera, and solver `bernstein` alone: march has the others.
 ///
 /// ISO_ON_DEMAND, by -D: 1: rays decode the blocks that they come to (on_demand.h). So they wait
-/// only where there is no free slot, and a frame with enough of them takes one pass.
+/// only if there is no free slot, and a frame with enough slots takes one pass.
 #ifndef ISO_ON_DEMAND
 #define ISO_ON_DEMAND 0
 #endif
