@@ -1,6 +1,6 @@
 #pragma once
-// Every device buffer of a renderer, added up before any of them is made: what a memory budget is
-// held to. How large they are is up to their owners, which say so by sizes().
+// Every device buffer of a renderer, added up before any of them is made, for the memory budget.
+// The owners of the buffers state their lengths by sizes().
 
 #include <algorithm>
 #include <cstdint>
@@ -17,17 +17,17 @@
 
 namespace isowave::core {
 
-/// Where the compressed volume is while frames are drawn.
+/// The place of the compressed volume while frames are drawn.
 enum class StreamPlace {
   kAuto,    ///< on the device if that leaves room for a useful cache, otherwise on the host
   kDevice,  ///< whole
-  kHost     ///< in memory or in its file; blocks are uploaded when they are asked for
+  kHost     ///< in memory or in its file; blocks are uploaded when they are requested
 };
 std::string_view to_string(StreamPlace place);
 /// Throws  Error naming the places there are
 StreamPlace stream_place_from_string(std::string_view name);
 
-/// What the memory of a renderer depends on, besides its volume.
+/// What the memory of a renderer depends on, beside its volume.
 struct MemoryRequest {
   std::uint64_t num_rays = 0;
   PipelinePtr pipeline = rays_pipeline();
@@ -37,26 +37,26 @@ struct MemoryRequest {
       0;                            ///< bytes of one buffer of the compressed volume; 0: no limit
   std::uint32_t window_blocks = 0;  ///< see StreamWindow; 0: by the size of cache and blocks
   bool with_levels = false;         ///< the volume's coarser levels are on the device, too
-  bool with_bounds = false;         ///< and the bounds of their blocks' errors
-  std::uint64_t kept_rays = 0;      ///< of KeptPicture
+  bool with_bounds = false;         ///< the bounds of blocks' errors are on the device, too
+  std::uint64_t kept_rays = 0;      ///< rays of KeptPicture
   bool with_given_rays = false;     ///< rays of any origin, and ambient rays
-  bool sparse_table = false;        ///< the cache's, which rays look up in faster
+  bool sparse_table = false;        ///< the cache's table has room, so that rays look up faster
 };
 
-/// What the lengths of a renderer's buffers depend on, beside its compressed volume: the plan adds
-/// up the sizes() of these, and the renderer constructs from the same.
+/// Limits that the lengths of a renderer's buffers depend on, beside its compressed volume. The
+/// plan adds up the sizes() of these limits, and the renderer makes its buffers from them.
 struct RendererLimits {
   MacrocellBuffers::Limits macrocells{};
   Wavefront::Limits rays{};
   BlockCache::Limits cache{};
-  WaveLimits wave{};            ///< of camera rays
-  std::uint64_t kept_rays = 0;  ///< of KeptPicture; 0: there is none
+  WaveLimits wave{};            ///< camera rays
+  std::uint64_t kept_rays = 0;  ///< rays of KeptPicture; 0: there is none
 };
 
 struct MemoryPlan {
   PipelinePtr pipeline;
   RendererLimits limits{};
-  ocl::BufferSizes buffers;  ///< that live as long as the renderer
+  ocl::BufferSizes buffers;  ///< buffers that live as long as the renderer
   std::uint64_t setup_bytes =
       0;  ///< all that exists while the value ranges are built, scratch included
   std::uint32_t cache_slots = 0;
@@ -64,12 +64,12 @@ struct MemoryPlan {
   std::uint32_t most_slots = 0;
   StreamPlace stream = StreamPlace::kDevice;  ///< kDevice or kHost
   std::uint32_t window_blocks = 0;            ///< kHost: see StreamWindow
-  std::uint64_t stream_bytes = 0;             ///< of the buffers for the compressed volume
-  std::string reason;  ///< for the place: "the compressed volume of 10 bytes ..."
+  std::uint64_t stream_bytes = 0;             ///< bytes of the compressed volume's buffers
+  std::string reason;  ///< reason for the place: "the compressed volume of 10 bytes ..."
 
   std::uint64_t total() const { return buffers.bytes(); }
-  /// Bytes: the most that exists as long as the cache does not grow. What a cache takes is given
-  /// back before a larger one is made; so that is also the most that ever existed once it has.
+  /// The most bytes that exist while the cache has this size. A cache is freed before a larger one
+  /// is made, so after the cache has grown this is also the most that ever existed.
   std::uint64_t peak() const { return std::max(total(), setup_bytes); }
   bool can_grow() const { return cache_slots < most_slots; }
 };
