@@ -43,8 +43,8 @@ struct BlockPrecision {
   bool is_reversible() const { return min_exponent == ISO_REVERSIBLE; }
 };
 
-/// Drops the bit planes that a value error of at most voxel_error can spare. 0 drops none. Blocks
-/// of reversible streams can spare none.
+/// Drops the bit planes that an error of at most voxel_error allows to leave out. 0 drops none.
+/// Blocks of reversible streams can spare none.
 BlockPrecision with_fewer_planes(const BlockPrecision &bound, double voxel_error);
 
 struct CompressOptions {

@@ -75,17 +75,17 @@ void check_choice(const RenderArgs &options) {
     throw Error("--refined needs --time-budget");
   if (!options.max_surface_error && !options.time_budget) return;
   const char *choice = options.max_surface_error ? "--max-surface-error" : "--time-budget";
-  if (options.reference) throw Error("--reference cannot choose: leave out {}", choice);
+  if (options.reference) throw Error("--reference draws every frame in full: leave out {}", choice);
   if (options.time_budget) check_time_budget(*options.time_budget);
   if (options.time_budget && !options.progress_dir.empty())
     throw Error("--time-budget draws a frame in steps: leave out --progress-dir");
   if (!options.max_surface_error) return;
   check_max_surface_error(*options.max_surface_error);
   if (options.time_budget)
-    throw Error("--max-surface-error takes the time it takes: leave out --time-budget");
+    throw Error("--max-surface-error cannot keep a time: leave out --time-budget");
   if (options.frame.voxel_error > 0 || options.voxel_pixels > 0)
     throw Error(
-        "--max-surface-error chooses for itself: leave out --voxel-error and --voxel-pixels");
+        "--max-surface-error chooses the detail: leave out --voxel-error and --voxel-pixels");
 }
 
 }  // namespace
