@@ -204,8 +204,7 @@ ValueOffset value_offset(const LevelError &error, FieldBound bound, double plane
   if (!error.uniform) {
     throw Error(
         "the volume's error is not known, or not that of its levels of detail: convert it again, "
-        "with "
-        "--levels and without "
+        "with --levels and without "
         "--no-verify");
   }
   const double beyond =

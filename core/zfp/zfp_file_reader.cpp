@@ -263,8 +263,7 @@ class ZfpFileReader {
     if (volume_.is_indexed() && !has_trailer_)
       fail(
           "a file of zfp's own tool does not say where its blocks begin: decode it by zfp -h -z, "
-          "and "
-          "convert its voxels");
+          "and convert its voxels");
     CompressedVolume cut = volume_.is_indexed() ? cut_indexed(box) : cut_blocks(volume_, box);
     if (with_bounds && layout_.bounds_bytes != 0) {
       BoundsCutter bounds(volume_.num_blocks(), box);
@@ -441,8 +440,7 @@ class ZfpFileReader {
     if (mode != zfp_mode_fixed_rate) {
       fail(
           "zfp mode '{}': only fixed rate (zfp -r), fixed accuracy (zfp -a) and reversible (zfp "
-          "-R) "
-          "are supported",
+          "-R) are supported",
           kModes.at(mode));
     }
     if (stream.maxbits < kMinBlockBits || stream.maxbits > kMaxBlockBits) {
