@@ -76,7 +76,7 @@ std::vector<std::map<std::string, double>> measure_stages(ocl::Device &device,
   return views;
 }
 
-/// What does not depend on measurements.
+/// The part that does not depend on measurements.
 FrameReport make_report(const Options &options, const CompressedVolume &volume,
                         std::string command) {
   FrameReport report;
@@ -163,7 +163,7 @@ BudgetSweep measure_budgets(const Options &options, std::string command) {
                        options.max_passes, options.resident);
 }
 
-/// What can be told from the options alone.
+/// Checks that need only the options.
 void check_options(const CLI::App &app, const Options &options) {
   tools::check_renderer_options(app, options.renderer);
   check_image_size({options.size.at(0), options.size.at(1), options.samples});

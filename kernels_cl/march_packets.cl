@@ -229,7 +229,7 @@ ISO_INLINE void clear_hits(const View *view, uint tile, global HitRecord *hits) 
   }
 }
 
-/// Those of its rays that may meet the box of the active blocks.
+/// The rays of a packet that may meet the box of the active blocks.
 ISO_INLINE Mask on_screen(ScreenBox box, PacketSource source) {
   return source.lanes & (source.column >= (int)box.begin_x) & (source.column < (int)box.end_x) &
          (source.row >= (int)box.begin_y) & (source.row < (int)box.end_y);

@@ -45,7 +45,7 @@ Certificate certify(Renderer &renderer, const CompressedVolume &volume, const Fr
 Certificate certify(Renderer &renderer, const CompressedVolume &volume, const FrameRequest &request,
                     std::span<const HitRecord> drawn);
 
-/// What a certificate says of pixels that are not certain to miss.
+/// Summary of a certificate, over the pixels that are not certain to miss.
 struct CertificateSummary {
   std::uint64_t num_pixels = 0;     ///< of those
   std::uint64_t num_certified = 0;  ///< with a bound of at most the limit

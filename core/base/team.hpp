@@ -11,7 +11,7 @@
 
 namespace isowave::core {
 
-/// What goes to another process, or comes from it.
+/// Bytes that go to another process, or come from it.
 template <class Byte>
 struct Message {
   std::uint32_t rank;
@@ -34,7 +34,7 @@ void reduce_into(std::span<std::uint64_t> words, std::span<const std::uint64_t> 
 /// One process's part in a reduction: it gives its words from `begin` on. Called for parts, in any
 /// order, and from several threads.
 using MakeWords = std::function<void(std::size_t begin, std::span<std::uint64_t> words)>;
-/// What they have become. Called likewise.
+/// Takes the outcome of the words from `begin` on. Called likewise.
 using TakeWords = std::function<void(std::size_t begin, std::span<const std::uint64_t> words)>;
 
 /// A part in a reduction of words in memory. The receiver's words become the outcome.

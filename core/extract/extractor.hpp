@@ -26,7 +26,7 @@ struct ExtractorOptions {
   std::uint32_t part_vertices = 1u << 20;   ///< of a part of the mesh at most, but for one block's
 };
 
-/// What an extraction took.
+/// Counts and times of an extraction.
 struct ExtractStats {
   MeshSize size{};
   std::uint64_t listed_blocks = 0;   ///< whose cells the surface may pass

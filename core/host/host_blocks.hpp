@@ -41,7 +41,7 @@ class HostBlocks final : private BlockMaker {
   /// (cell_intersect.h), so that rays may skip them. What is decoded stays.
   void select(float isovalue);
 
-  /// What rays walk through, within run(). Stays valid until the next select().
+  /// The field that rays walk through, within run(). Stays valid until the next select().
   HostField field();
   /// The selected isovalue, and the box around the blocks that have such a cell.
   const Surface &surface() const { return surface_; }

@@ -86,7 +86,7 @@ struct HostLoops {
   /// another one, of its first layer along each axis whose bit is set, x 1, y 2, z 4. That is what
   /// the dual cells of the block before it along these axes have of it.
   void (*ranges)(const EncodedBlock &block, BlockRange *parts);
-  /// Which of 64 values, such as the voxels of a block, are inside: bit i.
+  /// Bit i: whether value i of 64, such as the voxels of a block, is inside.
   ulong (*inside)(const float *values, float isovalue);
   /// Writes the hits of a tile of the frame's rays into hits [height * width], those of rays that
   /// hit something alone. Eight rays at a time where the processor can (host_packets.hpp).

@@ -21,7 +21,7 @@ struct MeshSize {
   bool has_normals = false;
 };
 
-/// Where vertices are on the edges between voxels.
+/// Places of vertices on the edges between voxels.
 enum class VertexPlaces {
   /// At least kLeastGap from the edge's voxels. So no two vertices meet, every triangle has an
   /// area, and the mesh stays closed for programs that merge vertices by their positions.

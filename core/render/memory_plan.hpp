@@ -27,7 +27,7 @@ std::string_view to_string(StreamPlace place);
 /// Throws  Error naming the places there are
 StreamPlace stream_place_from_string(std::string_view name);
 
-/// What the memory of a renderer depends on, beside its volume.
+/// Everything that the memory of a renderer depends on, beside its volume.
 struct MemoryRequest {
   std::uint64_t num_rays = 0;
   PipelinePtr pipeline = rays_pipeline();

@@ -1,5 +1,5 @@
 #pragma once
-// What a renderer is made for.
+// The options that a renderer is made with.
 
 #include <cstdint>
 #include <vector>

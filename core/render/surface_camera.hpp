@@ -1,5 +1,5 @@
 #pragma once
-// Where isosurfaces may be, by the value ranges that a device computes.
+// The blocks that isosurfaces may be in, by the value ranges that a device computes.
 
 #include <optional>
 #include <span>

@@ -81,7 +81,7 @@ struct BlockRow {
   const std::uint64_t *no_data = nullptr;  ///< of its blocks: Chunk::no_data
 };
 
-/// What becomes of the voxels.
+/// Takes the checked voxels, chunk by chunk.
 class ChunkCoder {
  public:
   virtual ~ChunkCoder() = default;

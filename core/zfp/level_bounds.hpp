@@ -108,8 +108,8 @@ struct ValueOffset {
 ValueOffset value_offset(const LevelError &error, FieldBound bound, double plane_error,
                          const std::array<float, 2> &value_range);
 
-/// What is added to the value of voxel x + 4 y + 16 z of a block, in the order in which
-/// decode_block() in kernels_cl/device/block_stream.h adds it up.
+/// Offset of the value of voxel x + 4 y + 16 z of a block, added up in the order of decode_block()
+/// in kernels_cl/device/block_stream.h.
 float offset_of_voxel(const ValueOffset &offset, const BlockBounds &bounds, std::size_t block,
                       std::uint32_t voxel);
 

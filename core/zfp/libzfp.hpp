@@ -11,7 +11,7 @@
 
 namespace isowave::core {
 
-/// What libzfp has made; it makes nothing without memory.
+/// Returns an object that libzfp has made; throws std::bad_alloc if libzfp had no memory for it.
 template <class T>
 T *or_bad_alloc(T *made) {
   if (made == nullptr) throw std::bad_alloc();

@@ -60,7 +60,8 @@ class PyramidCoder : public ChunkCoder {
   /// off  how far this level's blocks are from the source; of the finest, none
   void finish(const LevelBounds::Off &off = {});
 
-  // What finish() does, for callers who put parts of volumes together: each once, in this order.
+  // The steps of finish(), for callers that put parts of volumes together: each once, in this
+  // order.
 
   /// Completes this level's volume but for its bounds. Returns the errors that were to be kept.
   std::vector<float> finish_level() {

@@ -94,7 +94,7 @@ class ZfpFileReader {
     if (!has_trailer_ || volume_.info.dims != coarser_level(finer.volume_.info).dims ||
         volume_.precision.whole_numbers)
       refuse_level();
-    // What a level says of its grid and range of values is not needed, so it cannot be wrong.
+    // The grid and range of values that a level states are not read, so they cannot be wrong.
     volume_.info = coarser_level(finer.volume_.info);
     volume_.value_range = kUnknownRange;
     layout_.counts_casts = finer.layout_.counts_casts;
@@ -130,7 +130,7 @@ class ZfpFileReader {
     return stream_bytes_ + layout_.index_bytes + layout_.bounds_bytes + layout_.no_data_bytes;
   }
 
-  /// That of everything before the trailer.
+  /// Checks the checksum of everything before the trailer.
   void check_sum() const {
     if (!has_trailer_) return;
     std::vector<std::byte> piece(1u << 16);
@@ -186,8 +186,8 @@ class ZfpFileReader {
     }
   }
 
-  /// Which voxels of another writer's block have no data: those that are NaN. Refuses those that
-  /// cannot be drawn.
+  /// The voxels without data of another writer's block, which are NaN. Refuses voxels that cannot
+  /// be drawn.
   std::uint64_t judge_voxels(std::uint64_t block, std::span<const float> values) const {
     std::uint64_t missing = 0, refused = 0;
     for (std::size_t i = 0; i < values.size(); ++i) {
