@@ -39,12 +39,12 @@ struct MacrocellBuffers {
 
 class Macrocells {
  public:
-  /// Without the buffers of its MacrocellBuffers.
+  /// Buffers without those of its MacrocellBuffers.
   ///
-  /// num_macrocells  of its level of detail
-  /// num_selections  of its MacrocellBuffers
+  /// num_macrocells  macrocells of its level of detail
+  /// num_selections  selections of its MacrocellBuffers
   static ocl::BufferSizes sizes(std::uint64_t num_macrocells, std::size_t num_selections);
-  /// Bytes that building needs beside what stays.
+  /// Bytes that building needs beside the buffers that stay.
   static std::uint64_t setup_scratch_bytes(const glm::uvec3 &num_blocks);
 
   /// Decodes every block once, beside a sample for the quantile table. Needs 128 bytes of scratch
@@ -80,7 +80,7 @@ class Macrocells {
   /// Waits    yes
   std::optional<BlockBox> active_blocks(const FrameParams &frame) const;
 
-  /// Takes other masks, of all levels that share the buffers, for select() and all that follows.
+  /// Switches to other masks, at all levels that share the buffers, for select() and later calls.
   void use(std::size_t selection) { buffers_->selection = selection; }
 
   /// [2 * coarse macrocells]: bit x + 4y + 16z of each block in its macrocell, 32 bits a word.
@@ -108,7 +108,7 @@ class Macrocells {
     ocl::Kernel<kernels::macrocell_partials> &kernel;
   };
 
-  /// The values that masks are made of, and the masks' box.
+  /// The values that masks are made from, and the masks' box.
   struct Selection {
     /// Isovalue, voxel_error, uniform and per-block offset of the layout; none: nothing yet.
     std::optional<std::array<double, 4>> of{};
