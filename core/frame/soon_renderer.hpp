@@ -63,7 +63,7 @@ class SoonRenderer : public RendererAround {
                                    Normals normals) override;
   Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {}) override;
   void clear_cache() override;
-  /// Of the renderer that took long, as its last call left it; 0 before it is ready.
+  /// Memory of the renderer that took long, as its last call left it; 0 before it is ready.
   std::uint64_t memory_bytes() const override { return is_ready_ ? memory_bytes_.load() : 0; }
   double setup_ms() const override { return is_ready_ && made_ ? made_->setup_ms() : 0; }
 
