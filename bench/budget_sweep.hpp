@@ -38,7 +38,7 @@ BudgetSweep sweep_budgets(const ocl::DeviceInfo &device_info, const CompressedVo
 
 void print_sweep(const BudgetSweep &sweep);
 
-/// What tools/charts reads.
+/// JSON that tools/charts reads.
 nlohmann::ordered_json to_json(const BudgetSweep &sweep);
 
 }  // namespace isowave::core::bench

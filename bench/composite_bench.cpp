@@ -51,7 +51,7 @@ struct CompositeInput : FrameRig {
     return count;
   }
 
-  /// What is hit so far has the twin's bits.
+  /// The hits so far have the twin's bits.
   void verify() {
     counts = read_counts();
     const std::vector<HitRecord> expected =

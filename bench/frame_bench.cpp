@@ -76,7 +76,7 @@ std::vector<std::map<std::string, double>> measure_stages(ocl::Device &device,
   return views;
 }
 
-/// What does not depend on measurements.
+/// The part that does not depend on measurements.
 FrameReport make_report(const Options &options, const CompressedVolume &volume,
                         std::string command) {
   FrameReport report;
@@ -163,7 +163,7 @@ BudgetSweep measure_budgets(const Options &options, std::string command) {
                        options.max_passes, options.resident);
 }
 
-/// What can be told from the options alone.
+/// Checks that need only the options.
 void check_options(const CLI::App &app, const Options &options) {
   tools::check_renderer_options(app, options.renderer);
   check_image_size({options.size.at(0), options.size.at(1), options.samples});
@@ -218,11 +218,11 @@ void add_options(CLI::App &app, Options &options) {
       "--device", options.device,
       "device: index, cpu, gpu, or a part of its name [ISOWAVE_DEVICE, or the first GPU]");
   tools::add_renderer_options(app, options.renderer);
-  app.add_option("--budgets", options.budgets,
-                 "draw the same orbit at each of these memory budgets, e.g. 200MB,400MB,1GB, or "
-                 "auto:N for N from "
-                 "the smallest to an ample one, in equal ratios of what lies above that; the "
-                 "pictures must be the same");
+  app.add_option(
+      "--budgets", options.budgets,
+      "draw the same orbit at each of these memory budgets, e.g. 200MB,400MB,1GB, or auto:N for N "
+      "from the smallest to an ample one, in equal ratios of what lies above that; the "
+      "pictures must be the same");
   tools::add_normals_option(app, options.normals);
   tools::add_ambient_option(app, options.ambient_rays);
   app.add_option("--max-passes", options.max_passes,

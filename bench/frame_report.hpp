@@ -1,5 +1,5 @@
 #pragma once
-// What frame_bench measured, as a table with the paper's columns and as JSON.
+// Results of frame_bench, as a table with the paper's columns and as JSON.
 
 #include <map>
 #include <nlohmann/json.hpp>

@@ -1,5 +1,5 @@
 #pragma once
-// What the stage benchmarks share: the device, inputs that are made once, and the clock.
+// Code that the stage benchmarks share: the device, inputs that are made once, and the clock.
 //
 //   // makes and checks its input: not timed
 //   struct SortInput { SortInput(ocl::Device &, std::int64_t pairs); ... };
@@ -27,8 +27,8 @@
 
 namespace isowave::core::bench {
 
-/// What no stage can beat, measured in the same run and by the clock that stages are timed with:
-/// OpenCL events where the driver reports them, else the wall clock.
+/// Limits that no stage can beat, measured in the same run and by the clock that times the stages:
+/// OpenCL events if the driver reports them, else the wall clock.
 struct Ceiling {
   double bytes_per_second =
       0;  ///< read and written by a copy of 256 MiB: the better of command and kernel
@@ -121,7 +121,7 @@ bool same_bits(std::span<const T> a, std::span<const T> b) {
   return std::ranges::equal(std::as_bytes(a), std::as_bytes(b));
 }
 
-/// What one run of a stage does.
+/// Counts of one run of a stage.
 struct Work {
   double items = 0;
   double bytes = 0;  ///< that must be read or written at least, each once

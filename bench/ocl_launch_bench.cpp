@@ -1,5 +1,5 @@
-// What a launch costs: an empty kernel, queued and with a wait after each launch, profiling off and
-// on. Wall clock.
+// The cost of a launch: an empty kernel, queued and with a wait after each launch, profiling off
+// and on. Wall clock.
 
 #include <chrono>
 

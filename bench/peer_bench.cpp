@@ -358,7 +358,7 @@ void compare(const Options &options, const std::string &command, const std::stri
   if (!options.json.empty()) tools::write_json(json, options.json);
 }
 
-/// What can be told from the options alone.
+/// Checks that need only the options.
 void check_options(const CLI::App &app, const Options &options) {
   if (!options.volume.empty()) tools::refuse_options(app, {"--dims"}, "leave it out, or --volume");
   if (is_zfp_name(options.volume))

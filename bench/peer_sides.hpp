@@ -1,5 +1,5 @@
 #pragma once
-// What peer_bench lets draw: one process each, so that the memory of each is its own.
+// The sides that peer_bench compares: one process each, so that the memory of each is its own.
 
 #include <chrono>
 #include <cstdint>

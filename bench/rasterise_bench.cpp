@@ -1,7 +1,5 @@
 // Triangles of an isosurface drawn into the hit buffer: rasterise.cl.
 
-#include <cmath>
-
 #include "bench/harness.hpp"
 #include "bench/scenes.hpp"
 #include "core/paper/mesh_renderer.hpp"
@@ -12,17 +10,16 @@ namespace {
 /// The mesh of mixing_layer(edge) is made; what is timed is a further frame of it.
 struct RasterInput {
   RasterInput(ocl::Device &device, std::int64_t edge, std::int64_t width)
-      : camera(orbit_cameras(mixing_layer(edge).info, 1)[0]),
+      : request{.camera = orbit_cameras(mixing_layer(edge).info, 1)[0],
+                .isovalue = kMixingLayerIsovalue},
         renderer(device, mixing_layer(edge), {.size = image_of_width(width)}) {
-    const MeshFrameStats stats = renderer.render(camera, kMixingLayerIsovalue);
-    triangles = double(stats.num_triangles);
-    check(stats.is_kept && triangles > 0, "there is a mesh");
-    std::size_t num_hits = 0;
-    for (const HitRecord &hit : renderer.hits()) num_hits += std::isfinite(hit.t) ? 1 : 0;
-    check(num_hits > 0, "there are hits");
+    const FrameStats stats = renderer.render(request);
+    triangles = double(renderer.last_frame().num_triangles);
+    check(renderer.last_frame().is_kept && triangles > 0, "there is a mesh");
+    check(renderer.num_hits(stats) > 0, "there are hits");
   }
 
-  Camera camera;
+  FrameRequest request;
   MeshRenderer renderer;
   double triangles = 0;
 };
@@ -35,7 +32,7 @@ void rasterise(benchmark::State &state) {
       state,
       {in.triangles,
        2 * 3 * sizeof(BlockVertex) * in.triangles + pixels * (8 + 2 * sizeof(HitRecord))},
-      [] {}, [&] { in.renderer.render(in.camera, kMixingLayerIsovalue); });
+      [] {}, [&] { in.renderer.render(in.request); });
   state.counters["triangles"] = in.triangles;
 }
 

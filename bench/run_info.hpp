@@ -1,5 +1,5 @@
 #pragma once
-// What a number was measured on and with: part of every JSON that bench/ writes.
+// The machine and the program of a measurement: part of every JSON that bench/ writes.
 
 #include <cstdint>
 #include <nlohmann/json.hpp>
@@ -14,7 +14,7 @@ namespace isowave::core::bench {
 /// Name -> value: device, driver, platform, clock, compiler, commit.
 std::vector<std::pair<std::string, std::string>> run_info(ocl::Device &device);
 
-/// What the stage times of a device come from: "OpenCL events", ...
+/// The source of a device's stage times: "OpenCL events", ...
 std::string clock_name(ocl::TimerSource source);
 
 /// Middle of the sorted values, the mean of both middles for an even count; 0 of none.

@@ -96,10 +96,10 @@ kernel void cache_request(const FrameParams frame_params, global PassCounts *cou
   }
 }
 
-/// Who reads a block's cells reads its dual grid, but march stamps just that block, which costs a
-/// GPU less in each pass than eight stamps. So a block was also read when one was whose dual grid
-/// it is in; or may have been, where that was needed since. Returns the stamp of a cached block's
-/// last use.
+/// Returns the stamp of a cached block's last use. A ray that reads a block's cells reads its dual
+/// grid, but march stamps only the block itself: one stamp costs a GPU less in each pass than
+/// eight. So a block counts as read when a block was read whose dual grid it is in, and may have
+/// been read if that block was needed since.
 ISO_INLINE uint last_use(const FrameParams *frame, global const BlockEntry *table,
                          global const uint *slot_stamps, uint block_id, uint stamp) {
   const BlockCoords b = block_coords(frame, block_id);
@@ -122,10 +122,10 @@ ISO_INLINE uint last_use(const FrameParams *frame, global const BlockEntry *tabl
 ///
 /// In      rank_histogram [ISO_EVICTION_RANKS]: 0
 /// Out     slot_ranks [slots]: eviction_rank(); rank_histogram: how many have each; slot_changing
-///         [slots], where the table may be rebuilt: what it knows of the blocks' cells
+///         [slots], if the table may be rebuilt: what it knows of the blocks' cells
 /// Launch  grid-stride over slots
 ///
-/// Were slot_changing lost, a view that comes again could need blocks that were not worth keeping.
+/// Without slot_changing, a view that comes again could need blocks that were not worth keeping.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_rank(
     const FrameParams frame_params, global const PassCounts *counts, uint num_slots, uint capacity,
     global const CacheState *cache, global const BlockEntry *table,
@@ -275,7 +275,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_se
   }
 }
 
-/// Frees the slots selected; empties the table where it is to be rebuilt. Grid-stride over slots.
+/// Frees the selected slots; empties the table if it is to be rebuilt. Grid-stride over slots.
 kernel void cache_evict(const FrameParams frame_params, global const PassCounts *counts,
                         uint num_slots, global uint *slot_block_ids, global const uint *slot_stamps,
                         global const uchar *slot_ranks, global BlockEntry *table,

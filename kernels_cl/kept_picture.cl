@@ -1,9 +1,9 @@
-/// kept_picture.cl -- a smaller picture of the same frame stands in where a larger one has nothing
-/// yet.
+/// kept_picture.cl -- a smaller picture of the same frame stands in for pixels of a larger one
+/// without a hit yet.
 #include "portable/shared_types.h"
 
-/// Fills a picture with the kept one's hits, each pixel with the nearest of the same place: where
-/// it has none itself, or everywhere. Both pictures have the same vertical field of view.
+/// Fills a picture with the kept one's hits, each pixel with the nearest of the same place: pixels
+/// without a hit, or all. Both pictures have the same vertical field of view.
 ///
 /// In      kept [kept_height * kept_width]
 /// Out     hits [height * width]

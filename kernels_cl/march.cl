@@ -79,7 +79,7 @@ ISO_INLINE void walk_round(const FrameParams *level, const CacheReader *cache, c
   }
 }
 
-/// Ends a round that all lanes have walked: the first place where something happens decides, and
+/// Ends a round that all lanes have walked. The first place at which something happens decides, and
 /// what other lanes found is void. Returns how many blocks of this lane are before that place.
 ISO_INLINE uint decide_round(RayMarch *m) {
   const uint place = *m->decides;
@@ -89,7 +89,7 @@ ISO_INLINE uint decide_round(RayMarch *m) {
   return m->lane < place ? min(m->num_passed, (place - m->lane - 1) / m->lanes + 1) : 0;
 }
 
-/// Stores where a ray that has no more rounds waits, if it does.
+/// Stores the place of a ray that has no more rounds, if the ray waits.
 ///
 /// behind   the block behind the border of its band, or ISO_INVALID_ID
 /// Returns  whether the ray waits; *entry: for the list of those that do
@@ -176,8 +176,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
         num_blocks += decide_round(&m);
         if (m.goes_on) atomic_inc(&num_going);
       }
-      barrier(CLK_LOCAL_MEM_FENCE |
-              CLK_GLOBAL_MEM_FENCE); /* all know where their ray stood: one may say where it is */
+      /* When all have read the place of their ray, one may store another. */
+      barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
       more = num_going != 0;
       barrier(CLK_LOCAL_MEM_FENCE);
     }

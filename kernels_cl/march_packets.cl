@@ -7,7 +7,7 @@
 /// of the camera, and solver `bernstein` alone: march has the others.
 ///
 /// ISO_ON_DEMAND, by -D: 1: rays decode the blocks that they come to (on_demand.h). So they wait
-/// only where there is no free slot, and a frame with enough of them takes one pass.
+/// only if there is no free slot, and a frame with enough slots takes one pass.
 #ifndef ISO_ON_DEMAND
 #define ISO_ON_DEMAND 0
 #endif
@@ -229,7 +229,7 @@ ISO_INLINE void clear_hits(const View *view, uint tile, global HitRecord *hits) 
   }
 }
 
-/// Those of its rays that may meet the box of the active blocks.
+/// The rays of a packet that may meet the box of the active blocks.
 ISO_INLINE Mask on_screen(ScreenBox box, PacketSource source) {
   return source.lanes & (source.column >= (int)box.begin_x) & (source.column < (int)box.end_x) &
          (source.row >= (int)box.begin_y) & (source.row < (int)box.end_y);

@@ -79,7 +79,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_
     const uint i = (begin + item) / lanes, lane = (begin + item) % lanes;
     if (i < num_rays) {
       const RayEntry entry = unpack_entry(active_ray_ids[i]);
-      /* At an active block, or where it has a side. */
+      /* The ray stands at an active block, or has a side. */
       const RayStand stand = read_stand(ray_block_ids[entry.pixel]);
       uint next = stand.block_id, side = stand.side;
       ISO_FRAME_OF(level, next);

@@ -13,8 +13,8 @@
 #include "portable/smooth_gradient.h"
 
 /// Looks for those of the 2^3 blocks from `base` on whose bits (corner x + 2y + 4z) are set in
-/// `wanted`. Returns which of them are cached, and in slots [8], ISO_GROUP_SIZE apart, where. All
-/// are read before one is looked at: a GPU waits once.
+/// `wanted`. Returns which of them are cached, and their places in slots [8], ISO_GROUP_SIZE apart.
+/// All are read before one is looked at: a GPU waits once.
 ISO_INLINE uint find_slots(const FrameParams *frame, global const BlockEntry *table,
                            BlockCoords base, uint wanted, local uint *slots) {
   uint keys[8], found[8], have = 0;
@@ -111,8 +111,8 @@ ISO_INLINE void write_gradient(global HitRecord *hit, const CachedStencil *cache
 }
 
 /// frame_params, frames, num_frames, parts  as start_rays
-/// begins  1: all hits; nothing happens where prev->next_active_count rays are still on their way
-///         to one. 0: those of the list
+/// begins  1: all hits; nothing happens while prev->next_active_count rays are still on their way
+///         to a hit. 0: the hits of the list
 /// prev    counts of the pass before
 /// In      active_ray_ids [prev->next_active_count], unless it begins
 /// Out     gradients of hits [pixel]; next_active_ray_ids [counts->next_active_count]: the rays

@@ -35,7 +35,7 @@ ISO_INLINE void clear_hits(global uint *words, uint count) {
 /// begins_frame  1: and with it a frame, for the stamps of cache slots (slot_stamps.h)
 /// frames  [num_frames] with levels of detail, those that draw, the finest first; frame_params is
 ///         the first of them
-/// given   [pixel] the rays, where ISO_GIVEN_RAYS is 1
+/// given   [pixel] the rays, if ISO_GIVEN_RAYS is 1
 /// ranges  of the blocks of all levels
 /// no_data, no_data_begin  as lacks_data_at_border
 /// counts  of the last pass of the wave before

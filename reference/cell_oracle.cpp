@@ -100,7 +100,7 @@ std::array<double, 4> power_form(const Corners &v, const Vec &p, const Vec &q) {
   return c[0];
 }
 
-/// Where the derivative is 0, in (0,1), ascending; -1 for none.
+/// The places in (0,1) where the derivative is 0, ascending; -1 for none.
 std::array<double, 2> extrema(const std::array<double, 4> &c) {
   const double a = 3 * c[3], half_b = c[2], constant = c[1];
   const double discriminant = half_b * half_b - a * constant;
@@ -150,8 +150,8 @@ float round_up(double x) {
 
 }  // namespace
 
-/// What one ray carries through Embree: the exact ray and the best hit so far. Embree's own ray is
-/// a float32 copy.
+/// The data that a ray carries through Embree: the exact ray and the best hit so far. Embree's own
+/// ray is a float32 copy.
 struct CellQuery : RTCIntersectContext {
   const CellOracle *oracle = nullptr;
   const OracleRay *ray = nullptr;

@@ -1,6 +1,6 @@
 #pragma once
-// What the oracles of the trilinear field have in common: given a ray, its first hit; given a
-// point, the field. Each answers with its own maths. Nothing here, nor in any oracle, comes from
+// The interface of the oracles of the trilinear field: given a ray, its first hit; given a point,
+// the field. Each oracle answers with its own maths. Nothing here, nor in any oracle, comes from
 // the kernels.
 
 #include <array>

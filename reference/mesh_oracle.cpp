@@ -36,7 +36,7 @@ Node node_place(unsigned node) {
   return place;
 }
 
-/// Where the vertex of an edge is kept: at a voxel, or only while its cell is worked on.
+/// Place in which the vertex of an edge is kept: at a voxel, or only while its cell is worked on.
 struct EdgeSlot {
   bool shared = false;
   std::array<unsigned char, 3> voxel{};  ///< shared: the owner, relative to the cell

@@ -8,9 +8,8 @@
 // Cubes is ambiguous there), and it passes through exactly the cells that have corners on both
 // sides: those that the trilinear surface can pass through.
 //
-// What can be judged by it: the triangles are not the trilinear surface, but both lie in the same
-// cells. Rule:
-//   - renderer and mesh agree where both miss, or both hit within a cell's diagonal, sqrt(3)
+// Rule of judging: the triangles are not the trilinear surface, but both lie in the same cells.
+//   - renderer and mesh agree if both miss, or both hit within a cell's diagonal, sqrt(3)
 //     voxels, along the ray;
 //   - else either may be right: at silhouettes, and in cells whose corners are inside and outside
 //     in turns, where a ray may pass between sheets that the triangles join. So the field around

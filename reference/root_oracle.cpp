@@ -98,7 +98,7 @@ Side side(const mpq_class &x) {
   return x >= 0 ? Side::kInside : Side::kOutside;
 }
 
-/// What is known of the first change of inside on a piece of the segment.
+/// Knowledge of the first change of inside on a piece of the segment.
 struct Answer {
   enum Kind { kNone, kChange, kUndecided } kind;
   double s = 0;
@@ -154,7 +154,7 @@ double middle(const mpq_class &x) {
   return x.get_d();
 }
 
-/// Where a cubic with one sign variation changes sign on [0,1], to double precision.
+/// The place in [0,1] where a cubic with one sign variation changes sign, to double precision.
 template <class Number>
 double place_of_root(const Polynomial<Number> &b) {
   const std::array<double, 4> c{middle(b[0]), middle(b[1]), middle(b[2]), middle(b[3])};

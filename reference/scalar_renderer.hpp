@@ -29,11 +29,11 @@ std::vector<HitRecord> render_scalar_levels(std::span<const FrameParams> frames,
                                             std::span<const std::vector<float>> voxels,
                                             Solver solver = kDefaultSolver, unsigned threads = 0);
 
-/// Gives the hits of such frames smooth gradients (Normals::kSmooth); what else they have stays.
+/// Gives the hits of such frames smooth gradients (Normals::kSmooth), and changes nothing else.
 void smooth_gradients(std::span<const FrameParams> frames,
                       std::span<const std::vector<float>> voxels, std::span<HitRecord> hits,
                       unsigned threads = 0);
-/// And of a frame of one level.
+/// The same for a frame of one level.
 void smooth_gradients(const FrameParams &frame, std::span<const float> voxels,
                       std::span<HitRecord> hits);
 
@@ -60,7 +60,7 @@ HitRecord trace_scalar(const FrameParams &frame, std::span<const float> voxels, 
 HitRecord trace_scalar_by_blocks(const FrameParams &frame, std::span<const float> voxels,
                                  Solver solver, const Ray &ray);
 
-/// What an intersector is asked about one cell.
+/// The question to an intersector about one cell.
 struct CellSegment {
   Cubic cubic;   ///< field minus isovalue along the ray, from entry (0) to exit (1)
   float length;  ///< from entry to exit [voxels]

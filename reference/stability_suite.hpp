@@ -44,8 +44,8 @@ std::vector<StabilityCase> stability_cases(std::uint32_t rays_per_case, std::uin
 /// at once and block by block.
 CaseResult run_case(const StabilityCase &stability_case, Solver solver);
 
-/// What the default solver must deliver: no failures, and the 99th percentile of |f - iso| / |grad
-/// f| at most this [voxels].
+/// Largest 99th percentile of |f - iso| / |grad f| that the default solver may have [voxels]. It
+/// may have no failures.
 inline constexpr double kResidualLimit = 1e-4;
 bool passes(const CaseResult &result);
 

@@ -34,7 +34,7 @@ class TwinRenderer : public Renderer {
   std::uint64_t memory_bytes() const override { return 0; }
 
  private:
-  /// What the twin's voxels depend on.
+  /// The settings that the twin's voxels depend on.
   struct Decoded {
     double voxel_pixels = 0, voxel_error = 0;
     FieldBound bound = FieldBound::kNone;

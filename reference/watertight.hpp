@@ -16,7 +16,7 @@ struct WatertightResult {
   std::uint64_t leaks = 0;  ///< rays that reach the other side without a hit
 };
 
-/// Who traces the rays.
+/// The levels of detail that rays go through.
 enum class RayBands {
   kOne,    ///< the volume's own grid
   kLevels  ///< three levels of detail, whose borders are anywhere on the ray, before and behind the

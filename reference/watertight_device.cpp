@@ -36,7 +36,7 @@ class SurfaceReader : public VolumeReader {
   std::vector<float> voxels_;
 };
 
-/// What the device sees of a compressed volume, and its levels of detail.
+/// The decoded voxels of a compressed volume and its levels of detail, as the device has them.
 GridLevels decoded_levels(const CompressedVolume &volume, bool with_levels) {
   GridLevels levels;
   for (const CompressedVolume *level : levels_of(volume, with_levels)) {

@@ -309,7 +309,7 @@ TEST(CliRender, ErrorsInsteadOfARate) {
   EXPECT_NE(depth(kHead + " --tolerance-relative 0.05"), exact);
   test::expect_one_line_error(
       "render " + kHead + " -i 80 --voxel-error -1 --depth " + quoted(folder / "b.npy"),
-      "value error of -1");
+      "voxel error of -1");
   test::expect_one_line_error(
       "render " + kHead + " -i 80 --rate 4 --exact --depth " + quoted(folder / "b.npy"), "rate");
 }
@@ -378,7 +378,7 @@ TEST(CliRender, MaxError) {
 
   const std::string command = "render " + file + " -i 80 --depth " + quoted(folder / "b.npy");
   test::expect_one_line_error(command + " --max-surface-error 1 --reference",
-                              "--reference cannot choose");
+                              "--reference draws every frame in full");
   test::expect_one_line_error(command + " --max-surface-error 0", "an error of 0 pixels");
   test::expect_one_line_error(command + " --max-surface-error 1 --voxel-error 1",
                               "leave out --voxel-error");
@@ -414,7 +414,7 @@ TEST(CliRender, TimeBudget) {
   const std::string command = "render " + scene + " -o " + picture("a") + " --time-budget ";
   test::expect_one_line_error(command + "0", "no picture can be drawn in 0 ms");
   test::expect_one_line_error(command + "nan", "--time-budget");
-  test::expect_one_line_error(command + "9 --reference", "--reference cannot choose");
+  test::expect_one_line_error(command + "9 --reference", "--reference draws every frame in full");
   test::expect_one_line_error(command + "9 --max-surface-error 1", "leave out --time-budget");
   test::expect_one_line_error(command + "9 --progress-dir " + quoted(folder / "p"),
                               "leave out --progress-dir");

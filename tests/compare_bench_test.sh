@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# tools/compare-bench on files written by hand, and on real ones where the benchmarks are built.
+# tools/compare-bench on files written by hand, and on real ones if the benchmarks are built.
 #   compare_bench_test.sh [FRAME_BENCH ISOWAVE_BENCH]
 set -euo pipefail
 top=$(cd "$(dirname "$0")/.." && pwd)

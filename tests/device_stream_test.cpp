@@ -401,8 +401,7 @@ TEST_P(DeviceStreamOnDevice, SmallMemoryIsBooked) {
     const DeviceStream stream(device_, volume, limit_for(volume, 3));
     EXPECT_EQ(device_.ledger().current(), (volume.word_count() + 2 * (2 + 2)) * sizeof(uint))
         << "behind two of three parts, a block's 64 bits from the last bit on, and two words that "
-           "decoders "
-           "read";
+           "decoders read";
   }
   EXPECT_EQ(device_.ledger().current(), 0u);
 }

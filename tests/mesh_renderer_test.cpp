@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/base/error.hpp"
+#include "core/host/host_renderer.hpp"
 #include "core/render/device_renderer.hpp"
 #include "reference/raster_twin.hpp"
 #include "tests/frame_scene.hpp"
@@ -34,6 +35,15 @@ std::vector<HitRecord> expected_hits(const TestVolume &volume, const Camera &cam
                           triangles_scalar(volume.info().dims, volume.voxels, isovalue));
 }
 
+/// Draws a frame.
+MeshFrameStats draw(MeshRenderer &renderer, const Camera &camera, float isovalue) {
+  const FrameStats stats =
+      renderer.render({.camera = camera, .isovalue = isovalue, .normals = Normals::kCell});
+  EXPECT_TRUE(stats.complete);
+  EXPECT_EQ(stats.passes.at(0).counts.decoded_count, renderer.last_frame().decoded_blocks);
+  return renderer.last_frame();
+}
+
 /// What the message of a budget that is too small says would do.
 std::uint64_t budget_named(const std::string &text) {
   return std::stoull(text.substr(text.rfind(": ") + 2));
@@ -51,14 +61,20 @@ TEST_P(MeshRendererOnDevice, SmallVolumeEqualsTheTwin) {
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
   MeshRenderer renderer(device_, volume.compressed, {.size = kSmall});
   EXPECT_THAT([&] { renderer.hits(); }, ThrowsMessage<Error>(HasSubstr("no frame")));
-  const MeshFrameStats stats = renderer.render(camera, 0.2f);
+  const MeshFrameStats stats = draw(renderer, camera, 0.2f);
   const std::vector<HitRecord> expected = expected_hits(volume, camera, kSmall, 0.2f);
   expect_same_hits(renderer.hits(), expected, kSmall.width);
   EXPECT_GT(num_hits(expected), 20u);
   EXPECT_TRUE(stats.is_new_surface && stats.is_kept);
   EXPECT_EQ(stats.decoded_blocks, stats.needed_blocks);
   EXPECT_EQ(stats.device_bytes, device_.ledger().current());
+  EXPECT_EQ(renderer.num_hits({}), num_hits(expected));
+  EXPECT_EQ(renderer.memory_bytes(), stats.device_bytes);
+  EXPECT_EQ(renderer.size().width, kSmall.width);
   EXPECT_EQ(renderer.shade().pixels.size(), 3 * kSmall.num_pixels());
+  const float isovalue = 0.2f;
+  const Camera chosen = renderer.camera({&isovalue, 1});
+  EXPECT_EQ(chosen.eye, HostRenderer(volume.compressed).camera({&isovalue, 1}, kSmall).eye);
 }
 
 TEST_P(MeshRendererOnDevice, FurtherFramesDrawTheMeshThatIsThere) {
@@ -68,12 +84,12 @@ TEST_P(MeshRendererOnDevice, FurtherFramesDrawTheMeshThatIsThere) {
   std::uint64_t most_slots = 0;
   for (const float isovalue : {0.2f, -1.0f, 0.2f, 0.9f, 100.0f, 0.2f}) {
     SCOPED_TRACE(isovalue);
-    const MeshFrameStats first = renderer.render(cameras[0], isovalue);
+    const MeshFrameStats first = draw(renderer, cameras[0], isovalue);
     EXPECT_TRUE(first.is_new_surface);
     EXPECT_GE(first.cache_slots, most_slots) << "the cache grows";
     most_slots = first.cache_slots;
     EXPECT_EQ(first.num_triangles == 0, isovalue == 100.0f);
-    const MeshFrameStats second = renderer.render(cameras[1], isovalue);
+    const MeshFrameStats second = draw(renderer, cameras[1], isovalue);
     EXPECT_FALSE(second.is_new_surface);
     EXPECT_EQ(second.decoded_blocks, 0u);
     EXPECT_EQ(second.num_triangles, first.num_triangles);
@@ -81,10 +97,11 @@ TEST_P(MeshRendererOnDevice, FurtherFramesDrawTheMeshThatIsThere) {
     expect_same_hits(renderer.hits(), expected_hits(volume, cameras[1], kMedium, isovalue),
                      kMedium.width);
   }
-  EXPECT_EQ(renderer.render(cameras[0], 0.2f, ImageSize{20, 11}).decoded_blocks, 0u);
+  renderer.render({.camera = cameras[0], .isovalue = 0.2f, .size = ImageSize{20, 11}});
+  EXPECT_EQ(renderer.last_frame().decoded_blocks, 0u);
   expect_same_hits(renderer.hits(), expected_hits(volume, cameras[0], {20, 11}, 0.2f), 20);
   renderer.clear_cache();
-  const MeshFrameStats cold = renderer.render(cameras[0], 0.2f);
+  const MeshFrameStats cold = draw(renderer, cameras[0], 0.2f);
   EXPECT_EQ(cold.decoded_blocks, cold.needed_blocks);
 }
 
@@ -96,7 +113,7 @@ TEST_P(MeshRendererOnDevice, ManyIsovaluesInOneCache) {
   for (std::uint32_t i = 0; i < 200; ++i) {
     const float isovalue = 1.5f + static_cast<float>(37 * i % 157);
     SCOPED_TRACE(isovalue);
-    EXPECT_EQ(renderer.render(camera, isovalue).num_triangles, 2u * 11 * 11);
+    EXPECT_EQ(draw(renderer, camera, isovalue).num_triangles, 2u * 11 * 11);
   }
 }
 
@@ -107,16 +124,16 @@ TEST_P(MeshRendererOnDevice, AnyBudgetDrawsTheSamePicture) {
   std::uint64_t ample = 0, least = 0;
   {
     MeshRenderer renderer(device_, volume.compressed, {.size = kMedium});
-    ample = renderer.render(camera, 0.1f).device_bytes;
+    ample = draw(renderer, camera, 0.1f).device_bytes;
     expected = renderer.hits();
-    renderer.render(camera, 0.5f);
+    draw(renderer, camera, 0.5f);
     other = renderer.hits();
   }
   EXPECT_EQ(device_.ledger().current(), 0u);
   EXPECT_GT(num_hits(expected), 1000u);
   try {
     MeshRenderer renderer(device_, volume.compressed, {.size = kMedium, .memory_budget = 400'000});
-    renderer.render(camera, 0.1f);
+    draw(renderer, camera, 0.1f);
   } catch (const Error &error) {
     EXPECT_THAT(error.what(), HasSubstr("a memory budget of 400000 bytes is too small"));
     least = budget_named(error.what());
@@ -127,20 +144,20 @@ TEST_P(MeshRendererOnDevice, AnyBudgetDrawsTheSamePicture) {
     SCOPED_TRACE(bytes);
     ocl::Device device(GetParam());
     MeshRenderer renderer(device, volume.compressed, {.size = kMedium, .memory_budget = bytes});
-    const MeshFrameStats stats = renderer.render(camera, 0.1f);
+    const MeshFrameStats stats = draw(renderer, camera, 0.1f);
     expect_same_hits(renderer.hits(), expected, kMedium.width);
     EXPECT_EQ(stats.is_kept, bytes == ample);
     EXPECT_LE(stats.num_parts, last_parts);
     last_parts = stats.num_parts;
-    renderer.render(camera, 0.1f);
+    draw(renderer, camera, 0.1f);
     expect_same_hits(renderer.hits(), expected, kMedium.width);
-    renderer.render(camera, 0.5f);
+    draw(renderer, camera, 0.5f);
     expect_same_hits(renderer.hits(), other, kMedium.width);
     EXPECT_LE(device.ledger().peak(), bytes);
   }
   EXPECT_THROW(
       MeshRenderer(device_, volume.compressed, {.size = kMedium, .memory_budget = least - 1})
-          .render(camera, 0.1f),
+          .render({camera, 0.1f}),
       Error);
 }
 
@@ -148,14 +165,23 @@ TEST_P(MeshRendererOnDevice, SmallRefusals) {
   const TestVolume volume({5, 5, 5}, test::noise_field(6), 8);
   const Camera camera = orbit_cameras(volume.info(), 1)[0];
   MeshRenderer renderer(device_, volume.compressed, {.size = kSmall});
-  EXPECT_THAT([&] { renderer.render(camera, std::nanf("")); },
+  EXPECT_THAT([&] { draw(renderer, camera, std::nanf("")); },
               ThrowsMessage<Error>(HasSubstr("NaN")));
-  EXPECT_THAT(
-      [&] {
-        renderer.render(camera, 0, ImageSize{13, 10});
-      },
-      ThrowsMessage<Error>(HasSubstr("more than the 117 rays")));
-  EXPECT_THAT([&] { renderer.render({camera.eye, camera.eye}, 0); }, testing::Throws<Error>());
+  const auto refuses = [&](const FrameRequest &request, const char *text) {
+    EXPECT_THAT([&] { renderer.render(request); }, ThrowsMessage<Error>(HasSubstr(text)));
+  };
+  refuses({.camera = camera, .size = ImageSize{13, 10}}, "more than the 117 rays");
+  refuses({.camera = {camera.eye, camera.eye}}, "");
+  refuses({.camera = camera, .voxel_pixels = 1}, "leave out voxel_pixels");
+  refuses({.camera = camera, .voxel_error = 1}, "leave out voxel_error");
+  refuses({.camera = camera, .bound = FieldBound::kLower}, "leave out bound");
+  refuses({.camera = camera, .ambient_rays = 1}, "ambient rays");
+  refuses({.camera = camera, .time_budget_ms = 1}, "leave out time_budget_ms");
+  Camera parallel = camera;
+  parallel.parallel_height = 4;
+  refuses({.camera = parallel}, "leave out parallel projection");
+  EXPECT_THAT([&] { renderer.cast_rays({}, 0, Normals::kCell); },
+              ThrowsMessage<Error>(HasSubstr("no rays of any origin")));
   EXPECT_THAT(
       [&] {
         MeshRenderer(device_, volume.compressed, {.size = {0, 5}});
@@ -166,9 +192,10 @@ TEST_P(MeshRendererOnDevice, SmallRefusals) {
         MeshRenderer(device_, volume.compressed, {kSmall, 1000});
       },
       ThrowsMessage<Error>(HasSubstr("a memory budget of 1000 bytes is too small")));
-  const MeshFrameStats none = renderer.render(camera, 50);
+  const MeshFrameStats none = draw(renderer, camera, 50);
   EXPECT_EQ(none.num_triangles, 0u);
   EXPECT_EQ(num_hits(renderer.hits()), 0u);
+  EXPECT_EQ(renderer.num_hits({}), 0u);
 }
 
 /// A sphere: where rays do not graze it, both hit it, and as far apart as the triangles allow.
@@ -186,7 +213,7 @@ TEST_P(MeshRendererOnDevice, DepthIsThatOfTheRaysAsFarAsTrianglesAllow) {
     DeviceRenderer rays(device_, volume.compressed, {.size = kMedium});
     rays.render({.camera = camera, .isovalue = 0});
     MeshRenderer mesh(device_, volume.compressed, {.size = kMedium});
-    mesh.render(camera, 0);
+    draw(mesh, camera, 0);
     const std::vector<HitRecord> of_rays = rays.hits(), of_mesh = mesh.hits();
     std::uint64_t num_compared = 0;
     for (std::size_t i = 0; i < of_rays.size(); ++i) {
@@ -214,7 +241,7 @@ TEST_P(MeshRendererOnDevice, SheetsAreThoseOfTheRays) {
   DeviceRenderer rays(device_, volume.compressed, {.size = kMedium});
   rays.render({.camera = camera, .isovalue = 0.3f});
   MeshRenderer mesh(device_, volume.compressed, {.size = kMedium});
-  mesh.render(camera, 0.3f);
+  draw(mesh, camera, 0.3f);
   const std::vector<HitRecord> a = rays.hits(), b = mesh.hits();
   std::uint64_t num_near = 0;
   for (std::size_t i = 0; i < a.size(); ++i)

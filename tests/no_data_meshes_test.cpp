@@ -99,7 +99,7 @@ TEST_P(NoDataMeshes, SmallDrawnTrianglesHaveTheTwinsBits) {
                             16);
     MeshRenderer renderer(device, volume.compressed, {.size = kSize});
     const Camera camera = orbit_cameras(volume.info(), 3)[2];
-    renderer.render(camera, 0.25f);
+    renderer.render({camera, 0.25f});
     expect_same_hits(renderer.hits(),
                      rasterise_scalar(make_frame_params(volume.info(), camera, kSize, 0.25f),
                                       triangles_scalar(dims, volume.voxels, 0.25f)),

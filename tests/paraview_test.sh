@@ -4,7 +4,7 @@
 # Its packages cannot be installed beside the libvtk9-dev of `tools/setup --peer`. So they are
 # unpacked into the build folder, with what they need beyond what is installed, and pvpython finds
 # them by its environment. Runs after python_test.sh, whose virtual environment has the package.
-# Exits with 77, and says why, where there is no ParaView for this machine.
+# Exits with 77, and says why, if there is no ParaView for this machine.
 set -euo pipefail
 source=$1 build=$2
 work=$build/paraview_test

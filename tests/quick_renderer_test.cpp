@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <cmath>
+#include <array>
 #include <future>
 #include <isowave/isowave.hpp>
 #include <mutex>
@@ -27,9 +27,8 @@ class QuickRendererOnDevice : public testing::TestWithParam<core::ocl::DeviceInf
     return std::unique_lock(device_->implementation().mutex);
   }
   /// A renderer of one thread on the host, so that its frames have several bands.
-  Renderer make(const RendererOptions &options = {.largest = kSize, .with_levels = true},
-                const HostRendererOptions &host = {.num_threads = 1}) const {
-    return make_quick_renderer(device_, volume_, options, host);
+  Renderer make(const RendererOptions &options = {.largest = kSize, .with_levels = true}) const {
+    return make_quick_renderer(device_, volume_, options, {.num_threads = 1});
   }
   FrameRequest request() const {
     return {.camera = make_host_renderer(volume_).camera(10, kSize),
@@ -86,38 +85,25 @@ TEST_P(QuickRendererOnDevice, AFrameAtWorkIsBegunAnewByTheDevice) {
   EXPECT_EQ(frame.depth, renderer.render(wanted).depth);
 }
 
-TEST_P(QuickRendererOnDevice, FramesOfTheHostCanBeStopped) {
-  std::unique_lock busy = busy_device();
-  Renderer renderer = make();
-  FrameRequest wanted = request();
-  wanted.on_pass = [](const Progress &progress) { return progress.passes() < 2; };
-  const Frame frame = renderer.render(wanted);
-  EXPECT_TRUE(frame.statistics.cancelled);
-  EXPECT_EQ(frame.statistics.passes, 2u);
-  busy.unlock();
-}
-
 TEST_P(QuickRendererOnDevice, WhatTheHostCannotDrawWaits) {
-  FrameRequest levels = request();
+  FrameRequest levels = request(), bounds = request();
   levels.voxel_pixels = 2;
+  bounds.want_bounds = true;
   const std::vector<float> expected =
       Renderer(device_, volume_, {.largest = kSize, .with_levels = true}).render(levels).depth;
-  const auto draw = [](Renderer &renderer, const FrameRequest &wanted) {
-    return std::async(std::launch::async, [&] { return renderer.render(wanted); });
-  };
-  {
-    std::unique_lock busy = busy_device();
-    Renderer renderer = make();
-    auto frame = draw(renderer, levels);
-    busy.unlock();
-    EXPECT_EQ(frame.get().depth, expected);
-  }
   std::unique_lock busy = busy_device();
-  Renderer renderer = make({.largest = kSize}, {.memory_limit = 1});
-  const FrameRequest wanted = request();
-  auto frame = draw(renderer, wanted);
+  Renderer renderer = make();
+  EXPECT_TRUE(renderer.ready_for(request()));
+  EXPECT_FALSE(renderer.ready_for(bounds));
+  EXPECT_FALSE(renderer.ready_for(levels));
+  const auto what_it_can = [&] {
+    return std::array{renderer.can_draw(levels), renderer.can_draw(bounds)};
+  };
+  EXPECT_EQ(what_it_can(), (std::array{true, false})) << "before it is ready";
+  auto frame = std::async(std::launch::async, [&] { return renderer.render(levels); });
   busy.unlock();
-  EXPECT_EQ(frame.get().depth, make_host_renderer(volume_).render(wanted).depth);
+  EXPECT_EQ(frame.get().depth, expected);
+  EXPECT_EQ(what_it_can(), (std::array{true, false}));
 }
 
 TEST_P(QuickRendererOnDevice, ErrorsOfTheDeviceComeWithTheNextFrame) {
@@ -140,14 +126,25 @@ TEST_P(QuickRendererOnDevice, TheHostDrawsNothingThatTheDeviceWouldRefuse) {
               HasSubstr("needs a device"));
 }
 
-TEST_P(QuickRendererOnDevice, IsNotUsedInItsOwnOnPass) {
+/// Others may use the device while the host draws.
+TEST_P(QuickRendererOnDevice, HasTheDevicesTurnOnlyWhileTheDeviceDraws) {
+  const Turns &turns = device_->implementation().mutex;
+  std::unique_lock busy = busy_device();
   Renderer renderer = make();
   FrameRequest wanted = request();
+  bool is_mine = false;
   wanted.on_pass = [&](const Progress &) {
+    is_mine = turns.is_mine();
     EXPECT_THAT(error_of([&] { renderer.camera(10); }), HasSubstr("at work"));
     return true;
   };
+  std::async(std::launch::async, [&] { renderer.render(wanted); }).get();
+  EXPECT_FALSE(is_mine);
+  busy.unlock();
+  renderer.wait();
   renderer.render(wanted);
+  EXPECT_TRUE(is_mine);
+  EXPECT_FALSE(turns.is_mine());
 }
 
 /// Whether it has begun to compile or not.

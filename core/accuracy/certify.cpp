@@ -21,9 +21,9 @@ namespace isowave::core {
 namespace {
 
 constexpr float kNotCertain = std::numeric_limits<float>::infinity();
-/// What the t of a drawn hit and that of a bound's may have lost in float32 (make_hit()): each half
-/// an ulp of itself, and eight roundings of the ray's length in the cell: two of the step between
-/// its faces, one of the sum, and those of the root (ISO_ROOT_STEP).
+/// Parts that the t of a drawn hit and that of a bound's hit may have lost in float32 (make_hit()):
+/// each half an ulp of itself, and eight roundings of the ray's length in the cell (two of the step
+/// between its faces, one of the sum, and those of the root, ISO_ROOT_STEP).
 constexpr double kDistanceRounding = 2 * 0x1p-24, kCellRounding = 2 * 0x1p-21;
 
 /// A level's decoded voxels, as far as this rank has them, block by block as they are asked for.

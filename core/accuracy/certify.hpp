@@ -2,13 +2,14 @@
 // How far a drawn surface may be from the true one: the isosurface of the volume before
 // compression, trilinear between its voxels.
 //
-// Where the decoded field is known to within a bound, the true surface lies between the surfaces of
-// the lower and of the upper bound (FrameRequest::bound): along a ray that begins outside of
-// both, or inside of both, the first crossing of the true field is not before the first crossing of
-// one of them, and not behind that of the other. Pixels where only one is met, where a ray begins
-// between them, or where one is met outside of the volume, which coarse levels reach a little out
-// of, are not certified: any error there could make or end a surface. Behind voxels without data a
-// ray begins anew: what holds for its begin must hold there, and no gap may be between both hits.
+// If the decoded field is known to within a bound, the true surface lies between the surfaces of
+// the lower and of the upper bound (FrameRequest::bound). Take a ray that begins outside of both,
+// or inside of both: the first crossing of the true field is not before the first crossing of one
+// of them, and not behind that of the other. A pixel is not certified if its ray begins between the
+// two surfaces, meets only one of them, or meets one outside of the volume (coarse levels reach a
+// little out of it): any error there could make or end a surface. Behind voxels without data a ray
+// begins anew: its new begin must be outside of both or inside of both, and no gap may lie between
+// the two hits.
 
 #include <cstdint>
 #include <span>
@@ -30,21 +31,21 @@ struct Certificate {
 
 /// Bounds the error of a frame.
 ///
-/// renderer made with_bounds, or a team of such; the last frame that it draws here is another
-/// volume   that this process's renderer was made for
-/// request  of the frame
-/// drawn    depth of its rays; at rank 0 alone
-/// Returns  at rank 0; at others a certificate without bounds
+/// renderer made with_bounds, or a team of such renderers; its last frame is then another one
+/// volume   the volume that this process's renderer was made for
+/// request  the frame's request
+/// drawn    depth of the frame's rays; only at rank 0
+/// Returns  at rank 0 the certificate; at other ranks one without bounds
 /// Throws   Error, at all ranks: the volume's error is not known; the solver may miss crossings;
 ///          depths are not as many as the rays; coarser levels draw a volume with voxels without
 ///          data
 Certificate certify(Renderer &renderer, const CompressedVolume &volume, const FrameRequest &request,
                     std::span<const float> drawn);
-/// The same, of a frame's hits.
+/// The same from a frame's hits.
 Certificate certify(Renderer &renderer, const CompressedVolume &volume, const FrameRequest &request,
                     std::span<const HitRecord> drawn);
 
-/// What a certificate says of pixels that are not certain to miss.
+/// Summary of a certificate, over the pixels that are not certain to miss.
 struct CertificateSummary {
   std::uint64_t num_pixels = 0;     ///< of those
   std::uint64_t num_certified = 0;  ///< with a bound of at most the limit

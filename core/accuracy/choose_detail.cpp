@@ -25,8 +25,8 @@ std::vector<double> all_voxel_pixels() {
   return errors;
 }
 
-/// What values may lose: an eighth of their range, and so many times half of it, as long as that
-/// matters beside the error that the volume has anyway, and leaves out bit planes.
+/// Errors of voxels that may be chosen: an eighth of the range of values, and so many times half of
+/// it, as long as they matter beside the volume's own error, and leave out bit planes.
 constexpr int kNumValueErrors = 8;
 std::vector<double> voxel_errors(const CompressedVolume &volume, double error) {
   const double range = double{volume.value_range[1]} - double{volume.value_range[0]};

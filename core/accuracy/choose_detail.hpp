@@ -9,36 +9,35 @@ namespace isowave::core {
 
 /// Share of the pixels that may lose their certificate, against full detail.
 inline constexpr double kLostShare = 0.01;
-/// Coarser levels are taken where they leave at most so much of the finest level's blocks: a frame
-/// of several levels costs more beside that. A judgement: on the H100, frames with 0.5, 0.64, 0.71
-/// of the blocks took 0.89, 0.81, 0.87 of the time, others with 0.58 and 0.63 took 1.19 and 1.04
+/// Coarser levels are taken if they leave at most this share of the finest level's blocks, since
+/// several levels have a cost of their own. A judgement: on the H100, frames with 0.5, 0.64, 0.71
+/// of the blocks took 0.89, 0.81, 0.87 of the time; others with 0.58 and 0.63 took 1.19 and 1.04
 /// (bench/h100.md).
 inline constexpr double kMaxBlocksShare = 2.0 / 3;
 
-/// Bit planes are left out only of volumes with more bits a voxel. The others' frames would take
-/// about a twentieth less, for a bound that is zfp's promise instead of what was measured block by
-/// block (README.md).
+/// Bit planes are left out only of volumes with more bits a voxel than this. Frames of other
+/// volumes would take about a twentieth less time, and have zfp's promise as their bound instead of
+/// errors measured block by block (README.md).
 inline constexpr double kMinPlaneRate = 16;
 
-/// What a renderer must be made with for choose_detail(): bounds, and all levels of detail that the
-/// volume has.
+/// Options with what choose_detail() needs: bounds, and all levels of detail of the volume.
 RendererOptions with_choices(RendererOptions options, const CompressedVolume &volume);
 
 /// Chooses the detail of one frame.
 ///
-/// renderer           made with_choices(), or a team of such; the last frame that it draws here is
-///                    another
-/// volume             that this process's renderer was made for
-/// rate               of the whole volume [bits per voxel]
-/// request            of the frame; its own voxel_pixels and voxel_error do not matter
-/// max_surface_error  that most pixels are to keep [pixels], above 0
+/// renderer           made with_choices(), or a team of such renderers; its last frame is then
+///                    another one
+/// volume             the volume that this process's renderer was made for
+/// rate               rate of the whole volume [bits per voxel]
+/// request            the frame's request; its voxel_pixels and voxel_error do not matter
+/// max_surface_error  error that most pixels are to keep [pixels], above 0
 ///
-/// Draws small pictures of the frame, every so many pixels, and their bounds (certify()); so the
+/// Draws small pictures of the frame, every so many pixels, and their bounds (certify()). So the
 /// choice depends on data, camera and size, never on timings. Picks the coarsest levels of detail,
 /// then the fewest bit planes, that cost at most kLostShare of the certified pixels. Levels are
 /// skipped if they save too few blocks (kMaxBlocksShare); bit planes are kept for volumes below
 /// kMinPlaneRate bits a voxel. Full detail if most pixels do not keep max_surface_error even so.
-/// All ranks of a team choose alike: what rank 0 finds counts. Throws Error as certify() does.
+/// All ranks of a team choose what rank 0 finds. Throws Error as certify() does.
 DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, double rate,
                            const FrameRequest &request, double max_surface_error);
 /// The same with a renderer of the whole volume.

@@ -15,7 +15,7 @@ struct DepthError {
   double p50 = 0.0, p99 = 0.0, max = 0.0;
 };
 
-/// Depth image A, taken as the truth, against B. A pixel is hit where its depth is finite.
+/// Depth image A, taken as the truth, against B. A pixel is hit if its depth is finite.
 struct DepthComparison {
   std::uint64_t num_pixels = 0;
   std::uint64_t num_differing =

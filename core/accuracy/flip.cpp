@@ -125,8 +125,8 @@ Planes opponent_planes(const Image8 &image) {
 
 // ---- the two parts of the error
 
-/// What the eye resolves of each channel of YCxCz, sums of Gaussians (table 1 of the paper), as
-/// colours for hyab().
+/// The part of each channel of YCxCz that the eye resolves, by sums of Gaussians (table 1 of the
+/// paper), as colours for hyab().
 std::vector<glm::dvec3> as_seen(const Planes &picture, double pixels_per_degree) {
   struct Gaussian {
     double a, b;

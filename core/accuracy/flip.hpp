@@ -11,7 +11,7 @@ namespace isowave::core {
 /// A 0.7 m wide screen of 3840 pixels, seen from 0.7 m.
 inline constexpr double kPixelsPerDegree = 67.0206;
 
-/// What pictures are compared with.
+/// The reference that pictures are compared with.
 class Flip {
  public:
   explicit Flip(const Image8 &reference, double pixels_per_degree = kPixelsPerDegree);

@@ -125,8 +125,8 @@ Renderer make_team_renderer(Processes &processes, const std::filesystem::path &p
           core_options(options.renderer, static_cast<std::uint32_t>(volume.num_levels)),
           held->team);
     });
-    auto result = std::make_unique<CoreImplementation>(
-        held, volume.brick, held->turns,
+    auto result = std::make_unique<Renderer::Implementation>(
+        std::shared_ptr<Turns>(held, &held->turns), volume.brick,
         add_choices(std::move(renderer), options.renderer, volume.brick, volume.rate));
     result->device_info = held->device->info;
     result->grid = public_grid(volume.whole());

@@ -35,33 +35,48 @@ std::unique_ptr<core::Renderer> add_choices(std::unique_ptr<core::Renderer> rend
   return renderer;
 }
 
-std::unique_ptr<Renderer::Implementation> make_device_implementation(
-    std::shared_ptr<Device> device, std::shared_ptr<const Volume> volume,
-    const RendererOptions &options, const std::function<void()> &before_kernel) {
-  if (!device || !volume) throw core::Error("a renderer needs a device and a volume");
-  Device::Implementation &on = device->implementation();
-  const core::CompressedVolume &compressed = volume->implementation().volume;
+core::Abilities abilities_on_device(const RendererOptions &options, const Volume &volume) {
+  core::Abilities abilities =
+      core::DeviceRenderer::abilities_of(core_options(options, volume.num_levels()));
+  abilities.surface_error = options.with_bounds;
+  abilities.time_budget = options.with_time_budget;
+  return abilities;
+}
+
+std::unique_ptr<core::Renderer> make_on_device(Device &device, const Volume &volume,
+                                               const RendererOptions &options,
+                                               const std::function<void()> &before_kernel) {
+  Device::Implementation &on = device.implementation();
+  const core::CompressedVolume &compressed = volume.implementation().volume;
   const std::lock_guard lock(on.mutex);
   const KernelWatch watch(on.device, before_kernel);
-  std::unique_ptr<core::Renderer> renderer =
-      add_choices(std::make_unique<core::DeviceRenderer>(
-                      on.device, compressed, core_options(options, volume->num_levels())),
-                  options, compressed, compressed.rate());
-  auto result = std::make_unique<CoreImplementation>(
-      std::make_shared<std::pair<std::shared_ptr<Device>, std::shared_ptr<const Volume>>>(device,
-                                                                                          volume),
-      compressed, on.mutex, std::move(renderer));
-  result->device_info = on.info;
-  result->grid = volume->grid();
-  result->notices = volume->notices();
+  return add_choices(std::make_unique<core::DeviceRenderer>(
+                         on.device, compressed, core_options(options, volume.num_levels())),
+                     options, compressed, compressed.rate());
+}
+
+void check_there(const std::shared_ptr<Device> &device,
+                 const std::shared_ptr<const Volume> &volume) {
+  if (!device || !volume) throw core::Error("a renderer needs a device and a volume");
+}
+
+std::unique_ptr<Renderer::Implementation> make_implementation(
+    std::shared_ptr<Turns> turns, std::shared_ptr<Device> device,
+    std::shared_ptr<const Volume> volume, std::unique_ptr<core::Renderer> renderer) {
+  auto result = std::make_unique<Renderer::Implementation>(std::move(turns), std::move(volume),
+                                                           std::move(renderer));
+  result->device_info = device->info();
   result->device = std::move(device);
-  result->volume = std::move(volume);
   return result;
 }
 
 Renderer::Renderer(std::shared_ptr<Device> device, std::shared_ptr<const Volume> volume,
                    const RendererOptions &options)
     : implementation_(core::guarded("making a renderer", [&] {
-        return make_device_implementation(std::move(device), std::move(volume), options);
+        check_there(device, volume);
+        auto renderer = make_on_device(*device, *volume, options);
+        return make_implementation(std::shared_ptr<Turns>(device, &device->implementation().mutex),
+                                   device, volume, std::move(renderer));
       })) {}
+
 }  // namespace isowave

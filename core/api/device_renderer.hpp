@@ -14,10 +14,19 @@ core::RendererOptions core_options(const RendererOptions &options, std::uint32_t
 std::unique_ptr<core::Renderer> add_choices(std::unique_ptr<core::Renderer> renderer,
                                             const RendererOptions &options,
                                             const core::CompressedVolume &volume, double rate);
-/// A renderer of a device. before_kernel: called before each kernel is compiled; what it throws is
-/// thrown here.
-std::unique_ptr<Renderer::Implementation> make_device_implementation(
-    std::shared_ptr<Device> device, std::shared_ptr<const Volume> volume,
-    const RendererOptions &options, const std::function<void()> &before_kernel = {});
+/// What the renderer of make_on_device() can.
+core::Abilities abilities_on_device(const RendererOptions &options, const Volume &volume);
+/// Takes a turn of the device. before_kernel: called before each kernel is compiled; what it throws
+/// is thrown here.
+std::unique_ptr<core::Renderer> make_on_device(Device &device, const Volume &volume,
+                                               const RendererOptions &options,
+                                               const std::function<void()> &before_kernel = {});
+/// Throws  core::Error: there is none
+void check_there(const std::shared_ptr<Device> &device,
+                 const std::shared_ptr<const Volume> &volume);
+/// What users of that renderer see.
+std::unique_ptr<Renderer::Implementation> make_implementation(
+    std::shared_ptr<Turns> turns, std::shared_ptr<Device> device,
+    std::shared_ptr<const Volume> volume, std::unique_ptr<core::Renderer> renderer);
 
 }  // namespace isowave

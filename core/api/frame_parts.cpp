@@ -201,7 +201,8 @@ std::string text_of(const FrameRequest &request) {
 
 bool ProgressInTurns::show(const core::PassStats &pass,
                            const std::function<bool(const Progress &)> &on_pass) {
-  ++passes_;  // other threads see both only while it is open
+  // Other threads see both only while it is open.
+  passes_ = pass.begins_anew ? 1 : passes_ + 1;
   completed_percent_ = pass.completed_percent;
   set_open(true);
   bool goes_on = false;

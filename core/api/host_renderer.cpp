@@ -9,30 +9,15 @@
 
 namespace isowave {
 
-namespace {
-
-struct HostHeld {
-  std::shared_ptr<const Volume> volume;
-  Turns turns;  ///< one frame at a time
-};
-
-}  // namespace
-
 Renderer make_host_renderer(std::shared_ptr<const Volume> volume,
                             const HostRendererOptions &options) {
   return core::guarded("making a renderer", [&] {
     if (!volume) throw core::Error("a renderer needs a volume");
-    const auto held = std::make_shared<HostHeld>();
-    held->volume = volume;
-    const core::CompressedVolume &compressed = volume->implementation().volume;
-    auto result = std::make_unique<CoreImplementation>(
-        held, compressed, held->turns,
-        std::make_unique<core::HostRenderer>(
-            compressed, core::HostRendererOptions{options.memory_limit, options.num_threads}));
-    result->grid = volume->grid();
-    result->notices = volume->notices();
-    result->volume = std::move(volume);
-    return Renderer(std::move(result));
+    auto on_host = std::make_unique<core::HostRenderer>(
+        volume->implementation().volume,
+        core::HostRendererOptions{options.memory_limit, options.num_threads});
+    return Renderer(std::make_unique<Renderer::Implementation>(
+        std::make_shared<Turns>(), std::move(volume), std::move(on_host)));
   });
 }
 

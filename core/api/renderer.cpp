@@ -38,28 +38,38 @@ class ProgressOf : public ProgressInTurns {
 
 }  // namespace
 
-CoreImplementation::CoreImplementation(std::shared_ptr<const void> keep,
-                                       const core::CompressedVolume &of, Turns &turns,
-                                       std::unique_ptr<core::Renderer> renderer)
-    : keep_(std::move(keep)), volume_(of), turns_(turns), renderer_(std::move(renderer)) {
+Renderer::Implementation::Implementation(std::shared_ptr<Turns> turns,
+                                         const core::CompressedVolume &of,
+                                         std::unique_ptr<core::Renderer> renderer)
+    : turns_(std::move(turns)), volume_(of), renderer_(std::move(renderer)) {
   note_memory();
 }
 
-CoreImplementation::~CoreImplementation() {
-  const TurnOrMine turn(turns_);
+Renderer::Implementation::Implementation(std::shared_ptr<Turns> turns,
+                                         std::shared_ptr<const Volume> of,
+                                         std::unique_ptr<core::Renderer> renderer)
+    : Implementation(std::move(turns), of->implementation().volume, std::move(renderer)) {
+  grid = of->grid();
+  notices = of->notices();
+  volume = std::move(of);
+}
+
+Renderer::Implementation::~Implementation() {
+  const TurnOrMine turn(*turns_);
   renderer_.reset();
 }
 
-Frame CoreImplementation::render(const FrameRequest &request) {
+Frame Renderer::Implementation::render(const FrameRequest &request) {
   return guarded("rendering", [&] {
-    const std::lock_guard lock(turns_);
+    const std::lock_guard lock(*turns_);
     return draw(request);
   });
 }
 
-Frame CoreImplementation::draw(const FrameRequest &request) {
+Frame Renderer::Implementation::draw(const FrameRequest &request) {
   core::Team &team = renderer_->team();
   if (team.size() > 1) core::agree_on(team, "request", text_of(request));
+  if (!ready_for(request)) wait();
   check_wanted(request, renderer_->abilities());
   core::FrameRequest wanted = core_request(request, volume_);
   ProgressOf progress(*renderer_, core_appearance(request.appearance));
@@ -91,7 +101,7 @@ Frame CoreImplementation::draw(const FrameRequest &request) {
 }
 
 /// Gets what the request wants of the frame that was drawn, except bounds.
-void CoreImplementation::fetch(const FrameRequest &request, Frame &frame) {
+void Renderer::Implementation::fetch(const FrameRequest &request, Frame &frame) {
   if (request.want_picture)
     frame.picture = renderer_->shade(core_appearance(request.appearance)).pixels;
   if (request.want_normals || request.want_positions || request.want_hits) {
@@ -101,9 +111,10 @@ void CoreImplementation::fetch(const FrameRequest &request, Frame &frame) {
   }
 }
 
-Frame CoreImplementation::cast_rays(std::span<const Ray> rays, double isovalue, Normals normals) {
+Frame Renderer::Implementation::cast_rays(std::span<const Ray> rays, double isovalue,
+                                          Normals normals) {
   return guarded("casting rays", [&] {
-    const std::lock_guard lock(turns_);
+    const std::lock_guard lock(*turns_);
     const std::vector<core::HitRecord> hits =
         renderer_->cast_rays(world_rays(rays), core::drawn_isovalue(volume_, isovalue),
                              static_cast<core::Normals>(normals));
@@ -112,20 +123,24 @@ Frame CoreImplementation::cast_rays(std::span<const Ray> rays, double isovalue, 
   });
 }
 
-Camera CoreImplementation::camera(double isovalue, std::optional<ImageSize> size) {
+Camera Renderer::Implementation::camera(double isovalue, std::optional<ImageSize> size) {
   return guarded("looking for the surface", [&] {
-    const std::lock_guard lock(turns_);
+    const std::lock_guard lock(*turns_);
     const float drawn = core::drawn_isovalue(volume_, isovalue);
     return public_camera(
         renderer_->camera({&drawn, 1}, size ? std::optional(core_size(*size)) : std::nullopt));
   });
 }
 
-bool CoreImplementation::can_draw(const FrameRequest &request) const {
+bool Renderer::Implementation::can_draw(const FrameRequest &request) const {
   return isowave::can_draw(request, renderer_->abilities(), volume_);
 }
 
-std::string CoreImplementation::isovalue_notice(double isovalue) const {
+bool Renderer::Implementation::ready_for(const FrameRequest &request) const {
+  return ready() || isowave::can_draw(request, soon->meanwhile_abilities(), volume_);
+}
+
+std::string Renderer::Implementation::isovalue_notice(double isovalue) const {
   return guarded("looking at an isovalue",
                  [&] { return core::isovalue_notice(volume_, isovalue); });
 }
@@ -166,7 +181,7 @@ void Renderer::wait() const {
   implementation_->wait();
 }
 void Renderer::give_up() {
-  implementation_->give_up();
+  if (implementation_->soon != nullptr) implementation_->soon->give_up();
 }
 const std::shared_ptr<Device> &Renderer::device() const {
   return implementation_->device;

@@ -10,33 +10,12 @@
 
 #include "core/accuracy/certify.hpp"
 #include "core/api/turns.hpp"
-#include "core/frame/renderer.hpp"
+#include "core/frame/soon_renderer.hpp"
 #include "core/zfp/zfp_stream.hpp"
 #include "isowave/device.hpp"
 #include "isowave/renderer.hpp"
 
 namespace isowave {
-
-struct Renderer::Implementation {
-  virtual ~Implementation() = default;
-  virtual Frame render(const FrameRequest &request) = 0;
-  virtual Frame cast_rays(std::span<const Ray> rays, double isovalue, Normals normals) = 0;
-  virtual Camera camera(double isovalue, std::optional<ImageSize> size) = 0;
-  virtual bool can_draw(const FrameRequest &request) const = 0;
-  virtual bool ready() const { return true; }
-  virtual bool ready_for(const FrameRequest &) const { return true; }
-  virtual void wait() const {}
-  virtual void give_up() {}
-  virtual std::string isovalue_notice(double isovalue) const = 0;
-  virtual std::uint64_t memory_bytes() const = 0;
-  virtual double setup_ms() const = 0;
-
-  std::shared_ptr<Device> device{};
-  std::shared_ptr<const Volume> volume{};
-  DeviceInfo device_info{};
-  Grid grid{};
-  std::vector<std::string> notices{};
-};
 
 /// What the program reports of a frame, beside what Frame says.
 struct LastFrame {
@@ -44,26 +23,41 @@ struct LastFrame {
   core::Certificate certificate{};  ///< with FrameRequest::want_bounds; its bounds are Frame's
 };
 
-/// Draws by a renderer of core.
-class CoreImplementation : public Renderer::Implementation {
+struct Renderer::Implementation {
  public:
-  /// keep    what renderer, volume and turns need, which goes after them
-  /// of      the volume that this process draws
   /// turns   of calls: those of the device, if other renderers use it
-  CoreImplementation(std::shared_ptr<const void> keep, const core::CompressedVolume &of,
-                     Turns &turns, std::unique_ptr<core::Renderer> renderer);
+  /// of      the volume that this process draws, which must outlive this
+  Implementation(std::shared_ptr<Turns> turns, const core::CompressedVolume &of,
+                 std::unique_ptr<core::Renderer> renderer);
+  /// The same of a volume that the user has opened.
+  Implementation(std::shared_ptr<Turns> turns, std::shared_ptr<const Volume> of,
+                 std::unique_ptr<core::Renderer> renderer);
   /// Buffers go while no other thread drives the device.
-  ~CoreImplementation() override;
+  ~Implementation();
+  Implementation(const Implementation &) = delete;
+  Implementation &operator=(const Implementation &) = delete;
 
-  Frame render(const FrameRequest &request) override;
-  Frame cast_rays(std::span<const Ray> rays, double isovalue, Normals normals) override;
-  Camera camera(double isovalue, std::optional<ImageSize> size) override;
-  bool can_draw(const FrameRequest &request) const override;
-  std::string isovalue_notice(double isovalue) const override;
-  std::uint64_t memory_bytes() const override { return memory_bytes_; }
-  double setup_ms() const override { return renderer_->setup_ms(); }
+  Frame render(const FrameRequest &request);
+  Frame cast_rays(std::span<const Ray> rays, double isovalue, Normals normals);
+  Camera camera(double isovalue, std::optional<ImageSize> size);
+  bool can_draw(const FrameRequest &request) const;
+  bool ready() const { return soon == nullptr || soon->ready(); }
+  bool ready_for(const FrameRequest &request) const;
+  void wait() const {
+    if (soon != nullptr) soon->wait();
+  }
+  std::string isovalue_notice(double isovalue) const;
+  std::uint64_t memory_bytes() const { return soon ? soon->memory_bytes() : memory_bytes_.load(); }
+  double setup_ms() const { return renderer_->setup_ms(); }
   core::Renderer &core() { return *renderer_; }
   const LastFrame &last() const { return last_; }
+
+  std::shared_ptr<Device> device{};
+  std::shared_ptr<const Volume> volume{};
+  DeviceInfo device_info{};
+  Grid grid{};
+  std::vector<std::string> notices{};
+  core::SoonRenderer *soon = nullptr;  ///< the renderer, if it is one
 
  private:
   Frame draw(const FrameRequest &request);
@@ -71,9 +65,8 @@ class CoreImplementation : public Renderer::Implementation {
   /// For other threads, that may ask while a frame is drawn.
   void note_memory() { memory_bytes_ = renderer_->memory_bytes(); }
 
-  std::shared_ptr<const void> keep_;
+  std::shared_ptr<Turns> turns_;
   const core::CompressedVolume &volume_;
-  Turns &turns_;
   std::unique_ptr<core::Renderer> renderer_;
   LastFrame last_;
   std::atomic<std::uint64_t> memory_bytes_ = 0;

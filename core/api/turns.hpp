@@ -4,6 +4,7 @@
 #include <atomic>
 #include <mutex>
 #include <thread>
+#include <utility>
 
 #include "core/base/error.hpp"
 #include "core/base/fork.hpp"
@@ -26,8 +27,17 @@ class Turns {
     owner_ = std::this_thread::get_id();
   }
   void unlock() {
+    if (Turns *const taken = std::exchange(taken_, nullptr)) taken->unlock();
     owner_ = std::thread::id();
     mutex_.unlock();
+  }
+  /// Takes a turn of others, too, which ends with this one. This thread has the turn.
+  ///
+  /// Throws  as lock(), unless it was taken before in this turn
+  void take(Turns &others) {
+    if (taken_ == &others) return;
+    others.lock();
+    taken_ = &others;
   }
   /// Whether this thread has the turn.
   bool is_mine() const { return owner_ == std::this_thread::get_id(); }
@@ -35,6 +45,7 @@ class Turns {
  private:
   std::mutex mutex_;
   std::atomic<std::thread::id> owner_{};
+  Turns *taken_ = nullptr;  ///< by the thread that has the turn
 };
 
 /// A turn for what may also be done within a call that has the turn.

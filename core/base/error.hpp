@@ -27,8 +27,8 @@ class Error : public isowave::Error {
       : Error(fmt::format(format, std::forward<Args>(args)...)) {}
 };
 
-/// What a compiler of kernels refused: what() names the first error, log() is all that the compiler
-/// said.
+/// An error of a compiler of kernels: what() names the first error, log() is the compiler's whole
+/// message.
 class BuildError : public Error {
  public:
   BuildError(const std::string &message, std::string log) : Error(message), log_(std::move(log)) {}

@@ -1,5 +1,5 @@
 #pragma once
-// What a process that was forked from another one can still do: threads do not survive a fork.
+// Forked processes: threads do not survive a fork, so such a process can do less.
 
 namespace isowave::core {
 

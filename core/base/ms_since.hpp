@@ -1,5 +1,5 @@
 #pragma once
-// What the steady clock says of a piece of work.
+// Wall clock of a piece of work, by the steady clock.
 
 #include <chrono>
 

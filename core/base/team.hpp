@@ -11,7 +11,7 @@
 
 namespace isowave::core {
 
-/// What goes to another process, or comes from it.
+/// Bytes that go to another process, or come from it.
 template <class Byte>
 struct Message {
   std::uint32_t rank;
@@ -34,34 +34,34 @@ void reduce_into(std::span<std::uint64_t> words, std::span<const std::uint64_t> 
 /// One process's part in a reduction: it gives its words from `begin` on. Called for parts, in any
 /// order, and from several threads.
 using MakeWords = std::function<void(std::size_t begin, std::span<std::uint64_t> words)>;
-/// What they have become. Called likewise.
+/// Takes the outcome of the words from `begin` on. Called likewise.
 using TakeWords = std::function<void(std::size_t begin, std::span<const std::uint64_t> words)>;
 
-/// A part in a reduction of words in memory, which become the outcome where it is received.
+/// A part in a reduction of words in memory. The receiver's words become the outcome.
 struct WordsInPlace {
   MakeWords make;
   TakeWords take;
 };
 WordsInPlace in_place(std::span<std::uint64_t> words);
 
-/// All of them make the same calls in the same order.
+/// Processes that work together. All of them make the same calls in the same order.
 class Team {
  public:
   virtual ~Team() = default;
   virtual std::uint32_t rank() const = 0;  ///< of this process, 0 to size() - 1
   virtual std::uint32_t size() const = 0;
-  /// Everybody's text, by rank.
+  /// The texts of all processes, by rank.
   virtual std::vector<std::string> all_gather(const std::string &text) = 0;
-  /// Makes one word of those of all processes at each of `count` places. `take` is called where the
-  /// outcome is received.
+  /// Reduces the words of all processes to one word at each of `count` places. Receivers of the
+  /// outcome call `take`.
   virtual void reduce(std::size_t count, Reduction how, Receiver who, const MakeWords &make,
                       const TakeWords &take) = 0;
-  /// Sends and receives, in order, and is back when both are done; none is of this process. To be
-  /// called by those alone that are named. Drawing needs none.
+  /// Sends and receives, in order, and returns when both are done; never from or to this process.
+  /// Only the named processes call it. Drawing does not need it.
   virtual void exchange(std::span<const Outgoing> sent, std::span<const Incoming> received);
 };
 
-/// A reduction for teams that reduce words where they are: reduce_piece() is called for each piece.
+/// A reduction for teams that reduce words in place: reduce_piece() is called for each piece.
 void reduce_in_pieces(std::size_t count, bool receives, const MakeWords &make,
                       const TakeWords &take,
                       const std::function<void(std::span<std::uint64_t> words)> &reduce_piece);
@@ -78,15 +78,17 @@ class TeamOfOne : public Team {
   }
 };
 
-/// Throws Error at every rank if one gives a text: that of the first, with its rank, unless all
-/// give the same.
+/// Throws Error at every rank if a rank gives a text: the text of the first such rank, with its
+/// number unless all ranks give the same text.
 void agree_on_error(Team &team, const std::string &error);
 
-/// Does what each rank has to do by itself. Where one fails, all throw what it throws, so that none
-/// waits for it.
+/// Does each rank's own work. If a rank fails, all ranks throw its error, so that none waits for
+/// it.
 void together(Team &team, const std::function<void()> &work);
 
-/// Throws Error at every rank, which says which, unless all have the same. what: that they have.
+/// Throws Error at every rank unless all have the same text; the error names a rank that differs.
+///
+/// what  names the text
 void agree_on(Team &team, const std::string &what, const std::string &text);
 
 /// All ranks' values, by rank.

@@ -1,5 +1,5 @@
 #pragma once
-// What is done with short texts of files and options.
+// Functions for short texts of files and options.
 
 #include <algorithm>
 #include <charconv>

@@ -1,8 +1,9 @@
 #pragma once
-// Bricks as volumes that a renderer draws: their own blocks, and around them one layer of others'.
+// Bricks as volumes that a renderer draws: their own blocks, and one layer of other bricks' blocks
+// around them.
 //
-// Dual cells have voxels of the blocks behind, and smooth normals of those before, too. Where the
-// whole volume ends, so does a brick. So its hits, and their normals, have the bits of the whole.
+// Dual cells have voxels of the blocks behind, and smooth normals need those before, too. So a
+// brick's hits and their normals have the bits of the whole. The layer ends at the whole's border.
 
 #include <memory>
 #include <string>
@@ -15,12 +16,12 @@
 
 namespace isowave::core {
 
-/// Along each axis.
+/// Number of blocks along each axis.
 inline glm::ivec3 blocks_along(const VolumeInfo &info) {
   return glm::ivec3((info.dims + 3u) / 4u);
 }
 
-/// What a brick keeps of a volume of so many blocks: its own, and one layer around.
+/// The blocks of a volume that a brick keeps: its own, and one layer around. blocks: the volume's.
 BlockBox kept_blocks(const glm::ivec3 &blocks, const BlockBox &own);
 
 /// The grid of a brick. Rays of its frames are those of the whole volume.
@@ -29,44 +30,44 @@ BlockBox kept_blocks(const glm::ivec3 &blocks, const BlockBox &own);
 /// own    not empty, within the whole
 VolumeInfo brick_info(const VolumeInfo &whole, const BlockBox &own);
 
-/// Blocks along an edge of the cubes that cuts may not part (Cuts), where so many levels of detail
-/// are drawn: then a brick is the same box at all of them, and rays change from one level to
-/// another within it.
+/// Blocks along an edge of the cubes that cuts may not part (Cuts) if so many levels of detail are
+/// drawn. A brick is then the same box at all levels, and rays change level within a brick.
 inline int cut_unit(std::size_t num_levels) {
   return 1 << (num_levels - 1);
 }
 
 /// A brick of a volume.
 ///
-/// num_levels  of detail, the volume itself among them; own's planes are multiples of cut_unit()
+/// own         its planes are multiples of cut_unit()
+/// num_levels  levels of detail, with the volume itself
 /// Throws      Error: the file that the volume is in is shorter than it was
 CompressedVolume cut_brick(const CompressedVolume &whole, const BlockBox &own,
                            std::size_t num_levels = 1);
 
-/// A brick of a `.zfp` file, of which only its blocks are read: see read_zfp_blocks().
+/// A brick of a `.zfp` file. Reads only the brick's blocks: see read_zfp_blocks().
 CompressedVolume read_brick(const std::filesystem::path &path, const BlockBox &own,
                             std::size_t num_levels = 1, bool with_bounds = false);
 
 /// A brick of any other volume, of one level of detail, compressed as the whole would be. Reads the
-/// layers of voxels that the brick has part of; where an error is bounded, before that the whole
-/// volume. Range of values and measured error are the brick's: see agree_on_voxels().
+/// layers of voxels that the brick has a part of; if an error is bounded, it reads the whole volume
+/// before. Range of values and measured error are the brick's: see agree_on_voxels().
 ///
 /// Throws  Error as compress_volume()
 CompressedVolume compress_brick(const OpenReader &open, std::string_view what,
                                 const Storage &storage, const BlockBox &own);
 
-/// What open_compressed_volume() or open_any_volume() would give, of which only grids are there,
-/// the finest level of detail first.
+/// The grids of a volume's levels of detail, the finest first, without its voxels.
 ///
-/// Throws  Error as those do, but not on what only bricks can be drawn of
+/// Throws  Error as open_compressed_volume() and open_any_volume(), but not if only bricks of the
+///         volume can be drawn
 std::vector<VolumeInfo> read_levels(const std::string &path, const RawOverrides &overrides);
 
-/// A brick of such a volume, with so many levels of detail: read, or compressed.
+/// A brick of a volume of any kind, with so many levels of detail: read, or compressed.
 ///
-/// info    of the finest level, as read_levels() has it
+/// info    the finest level's, from read_levels()
 /// storage its device also makes generated voxels; with measure_error, bounds of a file's blocks
 ///         are read
-/// Throws  Error also on what cannot be drawn
+/// Throws  Error also if the brick cannot be drawn
 CompressedVolume load_brick(const std::string &path, const RawOverrides &overrides,
                             const Storage &storage, const VolumeInfo &info, std::size_t num_levels,
                             const BlockBox &own);

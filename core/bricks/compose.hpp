@@ -1,11 +1,10 @@
 #pragma once
-// Pictures of bricks put together: of each ray, the hit of the first brick that has one, in the
-// order of Cuts::order_from(). No distance is compared.
+// Pictures of bricks put together. The first brick with a hit of a ray wins, in the order of
+// Cuts::order_from(). No distance is compared.
 //
-// What is put together is a word of 64 bits for each ray: above, the place of the brick in that
-// order, below, 32 bits of what its ray has hit. So the smallest word wins, which is what
-// MPI_MIN finds. If there are few bricks, a colour takes half a word: 8 bits for the place, 24 for
-// the colour.
+// Each ray has a word of 64 bits: the upper half is the place of the brick in that order, the lower
+// half 32 bits of the hit. So the smallest word wins, which MPI_MIN finds. If there are few bricks,
+// a colour takes half a word: 8 bits for the place, 24 for the colour.
 
 #include <cstdint>
 #include <span>
@@ -16,7 +15,7 @@
 
 namespace isowave::core {
 
-/// Instead of a brick's place: no brick has a hit of this ray.
+/// Stands for a brick's place if no brick has a hit of the ray.
 inline constexpr std::uint32_t kNoPlace = 0xFFFFFFFF;
 
 /// Fields of HitRecord, each of 32 bits. block_id is not among them: ids are a brick's own.
@@ -36,10 +35,10 @@ void color_words(std::span<const std::uint32_t> colors, std::uint32_t place,
                  std::span<std::uint64_t> words);
 /// Gives an RGB picture's pixels from `begin` on the colours that won.
 ///
-/// Returns  of how many a brick has a hit
+/// Returns  the number of pixels with a hit
 std::size_t set_colors(std::span<const std::uint64_t> words, std::size_t begin, Image8 &image);
 
-/// Bricks that half a word is enough for.
+/// Most bricks for which half a word is enough.
 inline constexpr std::uint32_t kMostHalfWordBricks = 0xFF;
 /// words [(rays + 1) / 2]: as color_words(), two rays in each, the first in its lower half.
 void color_halves(std::span<const std::uint32_t> colors, std::uint32_t place,

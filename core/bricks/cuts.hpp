@@ -1,6 +1,6 @@
 #pragma once
-// A volume's blocks cut into bricks by planes: a k-d tree, which also says in which order an eye
-// sees them.
+// A volume's blocks, cut into bricks by planes: a k-d tree, which also gives the order in which an
+// eye sees the bricks.
 
 #include <cstdint>
 #include <functional>
@@ -12,36 +12,36 @@
 
 namespace isowave::core {
 
-/// Blocks of a box. 64 bits: only a brick's blocks must have ids of 32.
+/// Number of blocks in a box, in 64 bits: only a brick's blocks must have ids of 32 bits.
 std::uint64_t num_blocks(const BlockBox &box);
 
-/// How much work a box is, never less than any box within it: its blocks, or those that an isovalue
-/// touches.
+/// The work that a box makes, never less than that of any box within it: the number of its blocks,
+/// or of those that an isovalue touches.
 using BoxWork = std::function<std::uint64_t(const BlockBox &box)>;
 
 class Cuts {
  public:
-  /// Cuts the longest side of what is left to cut, again and again, where both parts have as much
-  /// work for each of their bricks, as near as planes between blocks allow.
+  /// Cuts boxes across their longest side until there are enough. All bricks have the same work, as
+  /// nearly as planes between blocks allow.
   ///
-  /// blocks  of the volume, along each axis
-  /// count   of bricks, each of at least one unit
-  /// unit    blocks along an edge of the cubes that are not cut: where levels of detail are to be
-  ///         cut at the same planes, 2^(levels - 1)
-  /// Throws  Error: no brick, or more than units
+  /// blocks  blocks of the volume, along each axis
+  /// count   number of bricks, each of at least one unit
+  /// unit    blocks along an edge of the cubes that are not cut: 2^(levels - 1) if levels of detail
+  ///         are to be cut at the same planes
+  /// Throws  Error: no brick, or more bricks than units
   Cuts(const glm::ivec3 &blocks, std::uint32_t count, const BoxWork &work = num_blocks,
        int unit = 1);
-  /// So many bricks along each axis, as equal as can be; x counts fastest.
+  /// Cuts so many bricks along each axis, as equal as possible; x counts fastest.
   ///
   /// Throws  Error: none along an axis, or more than units
   Cuts(const glm::ivec3 &blocks, const glm::uvec3 &bricks, int unit = 1);
 
-  /// Each block is in one.
+  /// The bricks. Each block is in one of them.
   const std::vector<BlockBox> &bricks() const { return bricks_; }
 
-  /// The place of each brick [as bricks()] in an order in which no brick is hidden by a later one:
-  /// a ray from that eye visits bricks by ascending place. So what the first brick of it finds is
-  /// the ray's hit.
+  /// The place of each brick [as bricks()] in an order in which no brick is hidden by a later one.
+  /// A ray from that eye visits bricks by ascending place, so the first brick with a hit has the
+  /// ray's hit.
   ///
   /// eye  in the index space of the volume [voxels], as the rays have it
   std::vector<std::uint32_t> order_from(const glm::vec3 &eye) const;
@@ -68,7 +68,7 @@ class Cuts {
   std::uint32_t root_ = 0;
 };
 
-/// "2x2x1". Throws Error.
+/// Reads a text such as "2x2x1". Throws Error.
 glm::uvec3 parse_bricks(std::string_view text);
 
 }  // namespace isowave::core

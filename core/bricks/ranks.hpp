@@ -1,5 +1,5 @@
 #pragma once
-// What the processes of a team have to know of each other before they draw bricks.
+// The facts that the processes of a team exchange before they draw bricks.
 
 #include <functional>
 #include <optional>
@@ -15,15 +15,15 @@
 
 namespace isowave::core {
 
-/// The device of a host's process of that number. selector: for ocl::choose_device(), or several
-/// with commas, of which processes take one each, again and again. Without commas, the devices of
-/// the same kind as the one that it means are shared out.
+/// The device of process number local_rank of a host.
 ///
-/// Throws  Error: no such device
+/// selector  for ocl::choose_device(). Several, with commas: processes take them in turn. One: the
+///           processes share the devices of that device's kind.
+/// Throws    Error: no such device
 ocl::DeviceInfo choose_local_device(const std::string &selector, std::uint32_t local_rank);
 
-/// What tells a volume from another of the same name: its grid, its file's length, and a checksum
-/// of both ends, where a `.zfp` file has the checksum of the rest.
+/// A text that tells a volume from another one of the same name: its grid, its file's length, and a
+/// checksum of both ends, one of which holds a `.zfp` file's checksum of the rest.
 ///
 /// Throws  Error: the file cannot be read
 std::string fingerprint(const std::string &path, const VolumeInfo &info);
@@ -35,22 +35,23 @@ std::size_t num_cut_levels(const VolumeInfo &whole, std::size_t num_levels, std:
 /// A brick for each rank. bricks: XxYxZ, or empty; unit: see Cuts. Throws Error.
 Cuts cut_for(const Team &team, const VolumeInfo &whole, const std::string &bricks, int unit);
 
-/// A brick for each rank, which isosurfaces touch about alike. load: gives a brick of those blocks.
+/// A brick for each rank, with about the same number of surface blocks. load: gives a brick of
+/// those blocks.
 ///
 /// Throws  Error at every rank: fewer layers of cubes than ranks, or what load() throws
 Cuts cut_by_surfaces(Team &team, const VolumeInfo &whole, std::span<const float> isovalues,
                      int unit, const std::function<CompressedVolume(const BlockBox &)> &load);
 
-/// Gives each rank's brick the range of values and the measured error of the whole volume, which
-/// one that was compressed here does not know.
+/// Gives each rank's brick the range of values and the measured error of the whole volume. A brick
+/// that was compressed here does not know them.
 ///
 /// Returns  bits per voxel of the whole (CompressedVolume::rate())
 double agree_on_voxels(Team &team, CompressedVolume &brick);
 
 /// The box, in the whole volume, around all ranks' boxes.
 ///
-/// brick  the grid of this rank's
-/// own    its box there; none: nothing is in it
+/// brick  the grid of this rank's brick
+/// own    this rank's box in its brick; none: it has no box
 std::optional<BlockBox> gather_box(Team &team, const VolumeInfo &brick,
                                    const std::optional<BlockBox> &own);
 

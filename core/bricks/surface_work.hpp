@@ -1,5 +1,5 @@
 #pragma once
-// How much of a volume isosurfaces touch, where cuts are to share that out.
+// The blocks that isosurfaces touch, for cuts that share them out.
 
 #include <cstdint>
 #include <glm/glm.hpp>
@@ -14,8 +14,8 @@ namespace isowave::core {
 /// Blocks along an edge of the cubes whose touched blocks are counted.
 inline constexpr int kWorkUnit = 4;
 
-/// The touched blocks of each cube of a brick's own blocks, x fastest: about, by the blocks' own
-/// voxels. It is a measure of work, not of what is drawn.
+/// About how many blocks are touched in each cube of a brick's own blocks, x fastest. Only the
+/// blocks' own voxels count: this measures work, not what is drawn.
 ///
 /// brick  in memory; its own blocks begin and end with cubes, or with the volume
 std::vector<std::uint32_t> count_touched(const CompressedVolume &brick,
@@ -24,7 +24,8 @@ std::vector<std::uint32_t> count_touched(const CompressedVolume &brick,
 /// Touched blocks of any box of whole cubes: a BoxWork.
 class SurfaceWork {
  public:
-  /// counts  of all cubes of a volume of so many blocks, x fastest
+  /// blocks  blocks of the volume, along each axis
+  /// counts  touched blocks of all its cubes, x fastest
   SurfaceWork(const glm::ivec3 &blocks, std::span<const std::uint32_t> counts);
   std::uint64_t operator()(const BlockBox &box) const;
 

@@ -24,7 +24,7 @@ RendererOptions options_for(const TeamVolume &volume, RendererOptions options) {
   return options;
 }
 
-/// Where rays come from: parallel ones from far away.
+/// The place that rays come from; far away for parallel rays.
 glm::vec3 eye_of(const View &view) {
   if (view.is_parallel == 0) return {view.eye_x, view.eye_y, view.eye_z};
   return -0x1p100f * glm::sign(glm::vec3(view.fwd_x, view.fwd_y, view.fwd_z));

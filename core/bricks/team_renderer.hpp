@@ -1,6 +1,6 @@
 #pragma once
-// Draws one brick of a volume, and with the team that draws the others the picture of the whole:
-// at rank 0, with the bits that one renderer of all would draw.
+// Draws one brick of a volume, and with its team the picture of the whole: at rank 0, with the bits
+// that one renderer of the whole would draw.
 
 #include <optional>
 #include <vector>
@@ -14,7 +14,7 @@
 
 namespace isowave::core {
 
-/// What put pictures together so far, at this rank.
+/// What putting pictures together has taken so far, at this rank.
 struct CompositionStats {
   std::uint64_t reductions = 0, bytes = 0;  ///< words that this rank gave
   double ms = 0;                            ///< wall clock, with the wait for slower ranks
@@ -23,15 +23,15 @@ struct CompositionStats {
 /// Draws the whole volume by the bricks of all ranks.
 class TeamRenderer : public Renderer {
  public:
-  /// cuts    as many bricks as ranks; each rank draws that of its number. As device and team, must
-  ///         outlive the renderer
-  /// volume  it: see brick_volume.hpp
+  /// volume  this rank's brick: see brick_volume.hpp
+  /// cuts    as many bricks as ranks; each rank draws the brick of its number. Device, cuts and
+  ///         team must outlive the renderer
   /// whole   grids of the whole volume's levels of detail, the finest first: those that the brick
-  ///         has, and others that frames do without
-  /// Throws  Error: as DeviceRenderer, at the rank that it is about
+  ///         has, and coarser ones that frames do without
+  /// Throws  Error: as DeviceRenderer, at the rank that fails
   TeamRenderer(ocl::Device &device, const CompressedVolume &volume, const RendererOptions &options,
                const Cuts &cuts, std::vector<VolumeInfo> whole, Team &team);
-  /// The same of a volume that the team has opened, which must outlive the renderer, too.
+  /// The same for a volume that the team has opened, which must outlive the renderer, too.
   ///
   /// options  with_levels and range_thresholds become the volume's
   TeamRenderer(ocl::Device &device, const TeamVolume &volume, RendererOptions options, Team &team);
@@ -44,7 +44,7 @@ class TeamRenderer : public Renderer {
   Team &team() override { return team_; }
   std::vector<VolumeInfo> levels() const override { return whole_levels_; }
 
-  /// Draws this rank's brick. Ambient rays go through those of all ranks.
+  /// Draws this rank's brick. Ambient rays go through the bricks of all ranks.
   ///
   /// request  All ranks have an on_pass, or none. It is called at all ranks after each pass of any
   ///          rank, may ask for the picture so far, and must return the same at all ranks.
@@ -61,12 +61,12 @@ class TeamRenderer : public Renderer {
   Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {}) override;
 
   ImageSize size() const override { return renderer_.size(); }
-  /// Colours are put together, or, of several rays a pixel, hits, which rank 0 shades.
+  /// Puts together colours; with several rays a pixel it puts together hits, which rank 0 shades.
   Image8 shade(const Appearance &appearance = {}) override;
   std::vector<float> depth() override;
   /// Hits without the ids of their blocks.
   std::vector<HitRecord> hits() override;
-  /// Puts the frame's depth together, if nothing was put together yet.
+  /// Puts together the frame's depth, if nothing was put together yet.
   std::uint64_t num_hits(const FrameStats &stats) override;
 
   void keep_picture() override { renderer_.keep_picture(); }
@@ -76,7 +76,7 @@ class TeamRenderer : public Renderer {
   std::uint64_t memory_bytes() const override { return renderer_.memory_bytes(); }
   double setup_ms() const override { return renderer_.setup_ms(); }
 
-  /// This rank's.
+  /// The renderer of this rank's brick.
   const DeviceRenderer &renderer() const { return renderer_; }
   const CompositionStats &composition() const { return composition_; }
 
@@ -86,9 +86,9 @@ class TeamRenderer : public Renderer {
   void add_ambient(const FrameRequest &request, FrameStats &stats);
   void reduce(std::size_t count, Reduction how, Receiver who, const MakeWords &make,
               const TakeWords &take);
-  /// image: rank 0's, black.
+  /// image: black; at rank 0 only.
   void compose_colors(std::span<const std::uint32_t> colors, Image8 &image);
-  /// A word of each ray.
+  /// Puts together a word of each ray.
   void compose(Receiver who, const MakeWords &make, const TakeWords &take);
   /// The hits that win among all bricks'.
   std::vector<HitRecord> compose_hits(std::span<const HitRecord> own,
@@ -100,12 +100,12 @@ class TeamRenderer : public Renderer {
   VolumeInfo brick_;
   const Cuts &cuts_;
   std::vector<VolumeInfo> whole_levels_;
-  std::size_t num_levels_;  ///< of these, that the brick has
+  std::size_t num_levels_;  ///< number of these that the brick has
   Team &team_;
-  std::uint32_t place_ = 0;                ///< of the brick, seen from the frame's eye
+  std::uint32_t place_ = 0;                ///< place of the brick, seen from the frame's eye
   std::vector<HitRecord> own_hits_;        ///< empty: not read yet
   bool has_whole_ = false;                 ///< the renderer has the hits of all bricks already
-  std::optional<std::uint64_t> num_hits_;  ///< of what was put together last
+  std::optional<std::uint64_t> num_hits_;  ///< hits in what was put together last
   CompositionStats composition_;
 };
 

@@ -1,6 +1,6 @@
 #pragma once
 // How a team opens a volume that it draws in bricks. The steps that wait for other ranks are in one
-// place, in one order: ranks that took them in another would wait for ever.
+// place, in one order: ranks that took them in different orders would wait forever.
 
 #include <cstddef>
 #include <functional>
@@ -14,8 +14,8 @@
 
 namespace isowave::core {
 
-/// The volume to open, and how to cut it. All ranks give the same, except what
-/// makes and encodes voxels.
+/// The volume to open, and how to cut it. All ranks give the same, except what makes and encodes
+/// voxels.
 struct TeamVolumeSource {
   std::string path{};
   RawOverrides overrides{};
@@ -29,7 +29,7 @@ struct TeamVolumeSource {
 /// A volume that a team has cut into bricks, and this rank's brick.
 struct TeamVolume {
   std::vector<VolumeInfo> levels;       ///< grids of the whole's levels, the finest first
-  std::size_t num_levels = 1;           ///< of these, that bricks have
+  std::size_t num_levels = 1;           ///< number of these that bricks have
   Cuts cuts;                            ///< a brick for each rank
   CompressedVolume brick;               ///< this rank's; ranges and errors are those of the whole
   std::vector<float> range_thresholds;  ///< RendererOptions::range_thresholds, of the whole

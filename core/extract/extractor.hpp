@@ -5,8 +5,8 @@
 //   active blocks -> [ request -> cache -> decode -> count ]* -> prefix sums
 //                 -> [ request -> cache -> decode -> write -> mesh ]*
 //
-// Where all blocks of the surface fit the cache, each is decoded once, and stays for the next
-// isovalue. Else the surface is gone through in batches, twice; no vertex depends on them.
+// If all blocks of the surface fit the cache, each is decoded once, and stays for the next
+// isovalue. Otherwise the surface is extracted in batches, each twice; no vertex depends on them.
 
 #include <cstdint>
 
@@ -26,12 +26,12 @@ struct ExtractorOptions {
   std::uint32_t part_vertices = 1u << 20;   ///< of a part of the mesh at most, but for one block's
 };
 
-/// What an extraction took.
+/// Counts and times of an extraction.
 struct ExtractStats {
   MeshSize size{};
   std::uint64_t listed_blocks = 0;   ///< whose cells the surface may pass
   std::uint64_t needed_blocks = 0;   ///< these and the neighbours that they need
-  std::uint64_t decoded_blocks = 0;  ///< more than needed where the cache does not hold all
+  std::uint64_t decoded_blocks = 0;  ///< more than needed if the cache does not hold all
   std::uint32_t cache_slots = 0;
   std::uint32_t count_batches = 0, write_batches = 0;
   std::uint64_t device_bytes = 0;  ///< of all buffers

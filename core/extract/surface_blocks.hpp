@@ -20,13 +20,13 @@ class SurfaceBlocks {
     Gradients gradients = Gradients::kNone;
     std::uint64_t memory_budget = 0;          ///< bound on all device memory [bytes]
     StreamPlace stream = StreamPlace::kAuto;  ///< where the compressed volume is
-    /// What the owner keeps on the device as long as this, beside what is here.
+    /// Other buffers that the owner keeps on the device as long as this.
     ocl::BufferSizes beside{};
     /// Rays of the Wavefront: a picture's, or one.
     std::uint64_t num_rays = 1;
   };
 
-  /// 3/4 of the device's memory: the budget of who was given none.
+  /// The budget if none is given: 3/4 of the device's memory.
   static std::uint64_t default_budget(const ocl::Device &device);
 
   /// Uploads the volume and builds its macrocell ranges.
@@ -72,8 +72,8 @@ class SurfaceBlocks {
   /// Forgets all decoded blocks, and gives their memory back, but for least_slots().
   void drop_cache() { resize_cache(least_slots()); }
 
-  /// Has what the entries [begin, end) of a list need cached. Returns false where that is more than
-  /// there are slots: then it is not.
+  /// Caches the blocks that the entries [begin, end) of a list need. Returns false, and caches
+  /// nothing, if there are not enough slots.
   ///
   /// Waits  yes
   bool bring(const ocl::Buffer<uint> &block_ids, std::uint32_t begin, std::uint32_t end);

@@ -12,7 +12,7 @@ namespace isowave::core {
 /// Throws  Error: more rays than ISO_MAX_AMBIENT_RAYS
 void check_ambient_rays(std::uint32_t num_rays);
 
-/// info: of the finest level of detail that draws the frame.
+/// info: the finest level of detail that draws the frame.
 AmbientParams make_ambient_params(const VolumeInfo &info);
 
 /// Returns  [num_rays][ISO_AMBIENT_PATTERNS], distributed by their cosine with z: point k + (p +

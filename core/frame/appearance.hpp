@@ -1,5 +1,5 @@
 #pragma once
-// What hits look like: a headlight, Blinn-Phong, and a light above it, on the hits' gradients.
+// Shading of hits: a headlight, Blinn-Phong, and a light above it, on the hits' gradients.
 
 #include <cstdint>
 #include <glm/glm.hpp>
@@ -11,7 +11,7 @@
 
 namespace isowave::core {
 
-/// Colours are display values, [0,1].
+/// Colours and lights. Colours are display values, [0,1].
 struct Appearance {
   glm::vec3 surface{219 / 255.0f, 189 / 255.0f, 135 / 255.0f};
   glm::vec3 background{1.0f, 1.0f, 1.0f};
@@ -21,13 +21,13 @@ struct Appearance {
   float above = 0.45f;    ///< diffuse light from above the headlight
 };
 
-/// How many ambient rays of each hit met nothing.
+/// The number of ambient rays of each hit that met nothing.
 struct OpenCounts {
   std::vector<uchar> counts;      ///< [height * width] by ray
   std::uint32_t num_ambient = 0;  ///< ambient rays of each hit; 0: there are none
 };
 
-/// GLM's columns -> rows [9], scaled so that the largest entry is 1: only directions count.
+/// Stores GLM's columns as rows [9], scaled so that the largest entry is 1: only directions count.
 void store_rows(const glm::dmat3 &m, float *rows);
 
 ShadeParams make_shade_params(const VolumeInfo &info, const Appearance &appearance);
@@ -38,9 +38,9 @@ Image8 rgb_image(std::uint32_t columns, std::uint32_t rows, const std::vector<ui
 
 /// The picture of a frame, made on the host with the bits of a device's (kernels_cl/shade.cl).
 ///
-/// hits     [height * width] of the frame's rays
-/// samples  rays of a pixel along each axis
-/// open     how much of the sky hits see
+/// hits     [height * width] hits of the frame's rays
+/// samples  rays per pixel along each axis
+/// open     open ambient rays of the hits
 /// Returns  RGB
 Image8 shade_scalar(const FrameParams &frame, const ShadeParams &params,
                     const std::vector<HitRecord> &hits, std::uint32_t samples = 1,

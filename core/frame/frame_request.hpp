@@ -1,5 +1,5 @@
 #pragma once
-// What a frame is asked for.
+// A request of a frame.
 
 #include <cstdint>
 #include <functional>
@@ -13,42 +13,42 @@
 
 namespace isowave::core {
 
-/// Called after each pass, the last included, and those for smooth normals and ambient rays, of
-/// which 100 % of the rays are completed; Renderer::hits() and shade() show the picture so far.
-/// Return false to stop. With a callback, or with profiling, the host waits after each pass;
-/// without, it stays a pass ahead.
+/// Called after each pass, also after the last one and those for smooth normals and ambient rays
+/// (which state 100 % of the rays as completed). Renderer::hits() and shade() show the picture so
+/// far. If it returns false, the frame stops. With a callback, or with profiling, the host waits
+/// after each pass; otherwise the host stays a pass ahead.
 using OnPass = std::function<bool(const PassStats &)>;
 
 /// One frame: what to draw, and how precisely. The same request gives the same picture, bit for
-/// bit, whatever was drawn before.
+/// bit.
 struct FrameRequest {
   Camera camera{};
   float isovalue = 0;
   std::optional<ImageSize> size{};  ///< none: the renderer's largest
-  /// Voxels of a coarser level of detail may be so many pixels apart, see make_level_frames(); 0:
-  /// the finest level draws all.
+  /// Largest distance between voxels of a coarser level of detail [pixels], see
+  /// make_level_frames(); 0: the finest level draws all.
   double voxel_pixels = 0;
-  /// How far the voxels may be from the volume's: 0, not at all; more, and fewer bit planes of each
-  /// block are decoded (with_fewer_planes()), of coarser levels of detail fewer still
+  /// Largest difference of decoded voxels from the volume's. Above 0, fewer bit planes of each
+  /// block are decoded (with_fewer_planes()), and fewer still at coarser levels of detail
   /// (voxel_error_of()).
   double voxel_error = 0;
-  /// What is drawn: the volume, or the field that is nowhere above, or nowhere below what the
-  /// volume's voxels were before compression, trilinear between them: decoded values are lowered or
-  /// raised by the bound of their error.
+  /// The field that is drawn: the volume's, or one that is nowhere above, or nowhere below, the
+  /// voxels before compression. Decoded values are then lowered or raised by the bound of their
+  /// error.
   FieldBound bound = FieldBound::kNone;
   Normals normals = Normals::kSmooth;  ///< gradients of the hits; nothing else depends on them
-  /// Rays of each hit that find out how much of the sky it sees, which shading shows
-  /// (kernels_cl/portable/ambient.h); 0: all see all of it.
+  /// Rays from each hit that find out how much of the sky it sees, for shading
+  /// (kernels_cl/portable/ambient.h); 0: each hit sees all of it.
   std::uint32_t ambient_rays = 0;
-  /// Instead of voxel_pixels and voxel_error: chooses them such that most pixels are within so many
-  /// pixels of the surface of the volume before compression.
+  /// Largest distance to the surface of the volume before compression [pixels]. voxel_pixels and
+  /// voxel_error are then chosen so that most pixels keep it.
   std::optional<double> max_surface_error{};
-  /// Draws what can be drawn in this time: small pictures first.
+  /// Time in which the largest picture possible is drawn, small pictures first.
   std::optional<double> time_budget_ms{};
   OnPass on_pass{};
 };
 
-/// The same request from another place.
+/// The same request with another camera.
 inline FrameRequest seen_from(const Camera &camera, FrameRequest request) {
   request.camera = camera;
   return request;

@@ -25,6 +25,7 @@ struct PassStats {
   std::optional<std::uint32_t> touched_blocks{};
   double utilization_percent = 0;  ///< ray-block pairs that were intersected, of all rays
   double completed_percent = 0;    ///< rays that have ended, of all
+  bool begins_anew = false;        ///< the first after another renderer's passes, see SoonRenderer
   std::map<std::string, double>
       stage_ms;  ///< by stage; empty unless the device was opened with profiling
 };

@@ -7,10 +7,10 @@ namespace isowave::core {
 
 enum class Normals {
   kSmooth,  ///< central differences, trilinear between voxels (portable/smooth_gradient.h)
-  kCell     ///< of the trilinear field itself, which jumps from cell to cell
+  kCell     ///< gradients of the trilinear field itself, which jump from cell to cell
 };
 
-/// "smooth", "cell".
+/// The name: "smooth", "cell".
 std::string_view to_string(Normals normals);
 /// Throws  Error naming both
 Normals normals_from_string(std::string_view name);

@@ -50,6 +50,8 @@ void check(const FrameRequest &request, const Abilities &abilities) {
   const auto need = [](bool is_asked, bool is_able, const char *text) {
     if (is_asked && !is_able) throw Error("{}", text);
   };
+  need(request.camera.parallel_height.has_value(), abilities.parallel,
+       "this renderer draws in perspective alone: leave out parallel projection");
   need(request.voxel_pixels > 0, abilities.levels,
        "this renderer draws the finest level of detail alone: leave out voxel_pixels, or draw on a "
        "device by a renderer that was made with_levels");

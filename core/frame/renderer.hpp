@@ -30,6 +30,7 @@ struct Abilities {
   bool surface_error = false;      ///< FrameRequest::max_surface_error
   bool time_budget = false;        ///< FrameRequest::time_budget_ms
   bool kept_picture = false;       ///< keep_picture() and what goes with it
+  bool parallel = true;            ///< Camera::parallel_height
   Solver solver = kDefaultSolver;  ///< finds the hits
 };
 
@@ -123,39 +124,41 @@ class Renderer {
 class RendererAround : public Renderer {
  public:
   /// inner: must outlive this
-  explicit RendererAround(Renderer &inner) : inner_(inner) {}
+  explicit RendererAround(Renderer &inner) : inner_(&inner) {}
   explicit RendererAround(std::unique_ptr<Renderer> inner)
-      : owned_(std::move(inner)), inner_(*owned_) {}
+      : owned_(std::move(inner)), inner_(owned_.get()) {}
 
-  Abilities abilities() const override { return inner_.abilities(); }
-  Team &team() override { return inner_.team(); }
-  std::vector<VolumeInfo> levels() const override { return inner_.levels(); }
-  FrameStats render(const FrameRequest &request) override { return inner_.render(request); }
+  Abilities abilities() const override { return inner().abilities(); }
+  Team &team() override { return inner().team(); }
+  std::vector<VolumeInfo> levels() const override { return inner().levels(); }
+  FrameStats render(const FrameRequest &request) override { return inner().render(request); }
   std::vector<HitRecord> cast_rays(std::span<const WorldRay> rays, float isovalue,
                                    Normals normals) override {
-    return inner_.cast_rays(rays, isovalue, normals);
+    return inner().cast_rays(rays, isovalue, normals);
   }
   Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {}) override {
-    return inner_.camera(isovalues, size);
+    return inner().camera(isovalues, size);
   }
-  ImageSize size() const override { return inner_.size(); }
-  Image8 shade(const Appearance &appearance = {}) override { return inner_.shade(appearance); }
-  std::vector<HitRecord> hits() override { return inner_.hits(); }
-  std::vector<float> depth() override { return inner_.depth(); }
-  std::uint64_t num_hits(const FrameStats &stats) override { return inner_.num_hits(stats); }
-  void keep_picture() override { inner_.keep_picture(); }
-  void fill_from_kept() override { inner_.fill_from_kept(); }
-  void enlarge_kept(const FrameRequest &request) override { inner_.enlarge_kept(request); }
-  void clear_cache() override { inner_.clear_cache(); }
-  std::uint64_t memory_bytes() const override { return inner_.memory_bytes(); }
-  double setup_ms() const override { return inner_.setup_ms(); }
+  ImageSize size() const override { return inner().size(); }
+  Image8 shade(const Appearance &appearance = {}) override { return inner().shade(appearance); }
+  std::vector<HitRecord> hits() override { return inner().hits(); }
+  std::vector<float> depth() override { return inner().depth(); }
+  std::uint64_t num_hits(const FrameStats &stats) override { return inner().num_hits(stats); }
+  void keep_picture() override { inner().keep_picture(); }
+  void fill_from_kept() override { inner().fill_from_kept(); }
+  void enlarge_kept(const FrameRequest &request) override { inner().enlarge_kept(request); }
+  void clear_cache() override { inner().clear_cache(); }
+  std::uint64_t memory_bytes() const override { return inner().memory_bytes(); }
+  double setup_ms() const override { return inner().setup_ms(); }
 
  protected:
-  Renderer &inner() const { return inner_; }
+  /// For classes that override inner().
+  RendererAround() = default;
+  virtual Renderer &inner() const { return *inner_; }
 
  private:
   std::unique_ptr<Renderer> owned_;
-  Renderer &inner_;
+  Renderer *inner_ = nullptr;
 };
 
 }  // namespace isowave::core

@@ -9,9 +9,10 @@
 
 namespace isowave::core {
 
-/// A view in which a box of blocks fills a picture of that size, from where orbit_cameras() begins.
+/// A view in which a box of blocks fills a picture of that size, from the direction in which
+/// orbit_cameras() begins.
 ///
-/// box  around the blocks that the surface may be in; none: the whole volume
+/// box  the box around the blocks that the surface may be in; none: the whole volume
 Camera surface_camera(const VolumeInfo &info, const std::optional<BlockBox> &box, ImageSize size);
 
 }  // namespace isowave::core

@@ -10,10 +10,10 @@ namespace isowave::core {
 
 namespace {
 
-/// Pixels of a step for each of the step before.
+/// Number of pixels of a step for each pixel of the step before.
 constexpr double kGrowth = 4;
 
-/// Adds what a step did to what the steps before did.
+/// Adds a step's statistics to those of the steps before.
 void add(FrameStats &sum, FrameStats step) {
   step.passes.insert(step.passes.begin(), sum.passes.begin(), sum.passes.end());
   step.normals += sum.normals;
@@ -24,7 +24,7 @@ void add(FrameStats &sum, FrameStats step) {
   sum = std::move(step);
 }
 
-/// A step is as complete as the rank that has got least far.
+/// A step is as complete as its least advanced rank.
 double least_percent(Team &team, double percent) {
   return std::ranges::min(gather(team, std::vector{percent}));
 }
@@ -48,7 +48,7 @@ Abilities TimedRenderer::abilities() const {
   return abilities;
 }
 
-/// All ranks must decide alike.
+/// The time, of rank 0 at all ranks: all ranks must decide alike.
 double TimedRenderer::now_ms() {
   return of_first(team(), std::vector{now_()}).front();
 }
@@ -142,7 +142,7 @@ std::size_t TimedRenderer::next_step(std::size_t step, double step_ms, double fi
     expected = last_ms_[finer] > 0 ? last_ms_[finer] : kGrowth * expected;
     if (expected <= left_ms) next = finer;
   }
-  // Part of a better picture is better than none.
+  // A part of a better picture is better than none.
   if (next == step && step > 0 && kGrowth * first_pass_ms <= left_ms) next = step - 1;
   return next;
 }

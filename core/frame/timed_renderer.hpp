@@ -1,7 +1,7 @@
 #pragma once
 // Frames within a time: first a small picture with coarse levels of detail, then larger and finer
-// ones, as long as there is time. What is drawn depends on timings, unlike everything else in
-// isowave; a whole picture is there however short the time.
+// ones, as long as there is time. Unlike everything else in isowave, these pictures depend on
+// timings. There is a whole picture for any time, however short.
 
 #include <array>
 #include <functional>
@@ -10,10 +10,10 @@
 
 namespace isowave::core {
 
-/// Draws frames with a time budget by a renderer that can keep a picture, in steps: 1/8, 1/4, 1/2
-/// of the rays along each axis, then all of them as the request says. Pictures of fewer rays have
-/// one for each pixel. If the renderer has levels of detail, smaller pictures use those whose
-/// voxels are at most one of their pixels apart. Requests without a budget are handed on.
+/// Draws frames with a time budget by a renderer that can keep a picture, in steps: with 1/8, 1/4
+/// and 1/2 of the rays along each axis, then with all rays. Smaller pictures have one ray per
+/// pixel. If the renderer has levels of detail, smaller pictures use levels whose voxels are at
+/// most one of their pixels apart. Requests without a budget are handed on.
 class TimedRenderer : public RendererAround {
  public:
   using Clock = std::function<double()>;  ///< [ms]
@@ -32,15 +32,15 @@ class TimedRenderer : public RendererAround {
 
   Abilities abilities() const override;
 
-  /// Draws the smallest picture, however long it takes, then the largest that is expected to be
-  /// whole in time, by what steps took in the frame before, and so on. A picture that is not whole
-  /// in time is filled from the one before. The hit buffer holds a picture of the full size. The
-  /// request's on_pass is called after each pass, while the renderer has a picture of the step's
-  /// size; if it returns false, the frame ends there, even in the smallest picture.
+  /// Draws the smallest picture, however long that takes. Each further step draws the largest
+  /// picture that is expected to be whole in time, by the times of steps in the frame before. If a
+  /// picture is not whole in time, the picture before fills it. The hit buffer then holds a picture
+  /// of the full size. The request's on_pass is called after each pass, while the renderer has a
+  /// picture of the step's size. If it returns false, the frame ends, even in the smallest picture.
   ///
   /// Returns  the statistics of all steps; rays_hit is the last step's, cancelled says whether
   ///          on_pass stopped the frame
-  /// Throws   Error: half of the picture is larger than what the renderer keeps
+  /// Throws   Error: half of the picture is larger than the renderer can keep
   FrameStats render(const FrameRequest &request) override;
 
   static double steady_clock_ms();
@@ -65,7 +65,7 @@ class TimedRenderer : public RendererAround {
                         double left_ms) const;
 
   Clock now_;
-  /// What each step took when it was drawn last; 0: unknown.
+  /// Time of each step when it was drawn last [ms]; 0: unknown.
   std::array<double, kNumSteps> last_ms_{};
 };
 

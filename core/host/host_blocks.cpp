@@ -27,7 +27,7 @@ constexpr std::uint32_t kEdge = ISO_MACROCELL_BLOCKS;
 constexpr uchar kNone = 0, kBeingMade = 1, kFirstSelection = 2;
 static_assert(HostField::kDecoded > kBeingMade);
 
-/// Where the blocks of a dual grid lie on pages of their own.
+/// Least number of pages: each block of a dual grid may lie on a page of its own.
 constexpr std::uint64_t kLeastPages = 8 + 1;
 
 /// Item `number` of a grid of at most ISO_MAX_BLOCK_IDS, x first. By 32 bits, which processors

@@ -1,6 +1,6 @@
 #pragma once
-// A compressed volume for rays on the host: the value ranges of all blocks, and of those that rays
-// come to, the voxels and where an isovalue is crossed.
+// A compressed volume for rays on the host: the value ranges of all blocks; for blocks that rays
+// come to, also their voxels, and the cells that an isovalue crosses.
 
 #include <atomic>
 #include <cstdint>
@@ -17,64 +17,64 @@
 
 namespace isowave::core {
 
-/// Not thread-safe, but for what rays call: BlockMaker.
+/// The blocks of a volume. Not thread-safe, except the functions that rays call (BlockMaker).
 class HostBlocks final : private BlockMaker {
  public:
-  /// Memory of a volume with this grid of which nothing is decoded.
+  /// Memory of a volume with this grid if nothing is decoded.
   static std::uint64_t bytes(const VolumeInfo &info);
-  /// The least limit: room for what a single ray needs at a time comes on top.
+  /// The least limit: bytes(), and room for the blocks that a single ray needs at a time.
   static std::uint64_t least_bytes(const VolumeInfo &info);
   static constexpr std::uint64_t kNoLimit = ~std::uint64_t{0};
 
-  /// Decodes the finest level once, for the ranges alone. Meanwhile 128 bytes for each block of a
-  /// layer along z come on top of bytes().
+  /// Decodes the finest level once, only for the ranges. This takes 128 more bytes for each block
+  /// of a layer along z.
   ///
   /// volume        must outlive this
-  /// memory_limit  of bytes(); at least least_bytes()
+  /// memory_limit  bound on bytes(); at least least_bytes()
   /// num_threads   0: one per processor
   /// Throws        Error: a file that the volume is in has become shorter, or cannot be read
   HostBlocks(const CompressedVolume &volume, std::uint64_t memory_limit, std::uint32_t num_threads);
   HostBlocks(CompressedVolume &&, std::uint64_t, std::uint32_t) = delete;
 
   /// Finds the blocks that have cells whose corners are not all on one side of an isovalue, for
-  /// field() and surface(). Nothing to do where it is the one in use. Other cells can have no hit
-  /// (cell_intersect.h), so that rays may skip them. What is decoded stays.
+  /// field() and surface(). Does nothing if the isovalue is in use. Other cells cannot have a hit
+  /// (cell_intersect.h), so rays may skip them. Decoded blocks stay.
   void select(float isovalue);
 
-  /// What rays walk through, within run(). Stays valid until the next select().
+  /// The field that rays walk through, within run(). Stays valid until the next select().
   HostField field();
   /// The selected isovalue, and the box around the blocks that have such a cell.
   const Surface &surface() const { return surface_; }
 
-  /// Calls work(item, is_alone) for each item below num_items on all threads; its rays decode what
-  /// they need. Where decoded blocks would pass the memory limit, items end with an exception, all
-  /// decoded blocks go, and such items are begun again. If not one of them can be done like that,
-  /// the next is done by one thread alone, with is_alone: its rays find room for what they need at
-  /// a time, so they must be traced one by one, not in packets.
+  /// Calls work(item, is_alone) for each item below num_items on all threads. Its rays decode the
+  /// blocks that they need. If decoded blocks would pass the memory limit, items end with an
+  /// exception, all decoded blocks are dropped, and these items begin again. If no item can be
+  /// finished in this way, one thread does the next item, with is_alone: its rays must be traced
+  /// one by one, not in packets, since there is room only for the blocks of one ray at a time.
   ///
-  /// Throws  Error: a file cannot be read; what work throws
+  /// Throws  Error: a file cannot be read; an exception of work
   void run(std::uint64_t num_items,
            const std::function<void(std::uint64_t item, bool is_alone)> &work);
 
-  /// Forgets what is decoded. Its memory is kept, and counts.
+  /// Forgets all decoded blocks. Their memory is kept, and counted.
   void forget();
   bool is_decoded(std::size_t block) const;
-  /// Blocks that have been decoded for rays, from the start.
+  /// Number of blocks that have been decoded for rays, from the start.
   std::uint64_t num_decoded() const { return num_decoded_.load(std::memory_order_relaxed); }
-  /// At present: bytes() and what is decoded, in whole pages of the system.
+  /// Memory at present: value ranges and decoded blocks, in whole pages of the system.
   std::uint64_t bytes() const { return num_bytes_.load(std::memory_order_relaxed); }
 
-  /// The box around the blocks that hold an isovalue as far as Macrocells knows, which keeps value
-  /// ranges in 8 bits: views that are made of it are those of a device.
+  /// The box around the blocks that hold an isovalue, by value ranges in 8 bits as Macrocells has
+  /// them. So views from this box are those of a device.
   ///
-  /// Returns  nothing where there is no block
+  /// Returns  nothing if there is no such block
   std::optional<BlockBox> rounded_box(float isovalue) const;
 
  private:
-  /// Decoded blocks would pass the memory limit.
+  /// Thrown if decoded blocks would pass the memory limit.
   struct NoRoom {};
 
-  /// An array of which parts are written to, page by page.
+  /// An array of which only parts are written to, page by page.
   struct Pages {
     Pages(std::uint64_t num_bytes);
     ReservedMemory memory;

@@ -1,8 +1,8 @@
 #pragma once
-// The inner loops of drawing on the host: decoding blocks, and walking rays through them. Each is
-// compiled twice, and chosen when the program runs: for any processor of its kind, and for those
-// with fused multiply-add, which the C library otherwise does in software. The same bits either
-// way.
+// The inner loops of drawing on the host: decoding blocks, and walking rays through them. Each loop
+// is compiled twice: for any processor of its kind, and for processors with fused multiply-add,
+// which the C library otherwise computes in software. The program chooses when it runs. Both give
+// the same bits.
 
 #include <atomic>
 #include <cstddef>
@@ -22,7 +22,7 @@ struct BlockRange {
 
 /// A block of a compressed stream.
 struct EncodedBlock {
-  const uint *words;  ///< two more than its last bit is in are read
+  const uint *words;  ///< two words behind the one with its last bit are read, too
   ulong first_bit;
   uint num_bits;
   int min_exponent;             ///< of BlockPrecision
@@ -34,7 +34,8 @@ struct EncodedBlock {
 /// Decodes blocks when the first ray comes to them. Thread-safe.
 class BlockMaker {
  public:
-  /// Makes all that a ray needs in a block: the voxels of its dual grid, and its cells that change.
+  /// Makes the data that a ray needs in a block: the voxels of its dual grid, and its changing
+  /// cells.
   virtual void open(std::size_t block) = 0;
   /// Decodes some blocks, up to eight.
   virtual void decode(std::span<const std::size_t> blocks) = 0;
@@ -43,22 +44,22 @@ class BlockMaker {
   ~BlockMaker() = default;
 };
 
-/// A volume that is decoded where rays come, and where an isovalue is crossed in it. What is there
-/// stays for as long as rays are traced, but for rays of a thread that traces alone
-/// (HostBlocks::run): for these, until the next call of open() or of the maker.
+/// A volume whose blocks are decoded when rays come to them, and the cells that an isovalue
+/// crosses. Decoded blocks stay as long as rays are traced. For a thread that traces alone
+/// (HostBlocks::run) they stay until the next call of open() or of the maker.
 struct HostField {
   const float *values;    ///< [block][64] x + 4y + 16z; of decoded blocks
   const ulong *changing;  ///< [open block] bit x + 4y + 16z: do the corners of the cell differ?
   const ulong *masks;     ///< [macrocell] bit x + 4y + 16z: has the block a cell that does?
   const std::atomic<uchar> *decoded;  ///< [block] kDecoded: its values are there
   const std::atomic<uchar> *opened;   ///< [block] selection: it is open
-  uchar selection;                    ///< which isovalue blocks are open for
+  uchar selection;                    ///< the isovalue that blocks are open for
   BlockMaker *maker;
 
   static constexpr uchar kDecoded = 2;
 
-  /// To be called before a ray looks into a block. What the thread wrote that made the block can be
-  /// read then: it released opened[block] after that.
+  /// Call it before a ray looks into a block. The ray can then read what the thread that made the
+  /// block has written, since that thread released opened[block] afterwards.
   void open(std::size_t block) const {
     if (__builtin_expect(opened[block].load(std::memory_order_acquire) != selection, 0))
       maker->open(block);
@@ -80,26 +81,26 @@ struct AmbientRays {
 };
 
 struct HostLoops {
-  /// Decodes a block to values [64], NaN of voxels without data.
+  /// Decodes a block to values [64]; voxels without data are NaN.
   void (*decode)(const EncodedBlock &block, float *values);
-  /// The ranges of a block's voxels with data within the volume, in parts [8]: part 0 has all;
-  /// another one, of its first layer along each axis whose bit is set, x 1, y 2, z 4. That is what
-  /// the dual cells of the block before it along these axes have of it.
+  /// Value ranges of parts [8] of a block, over voxels with data within the volume. Part 0 is the
+  /// whole block. Another part has the first layer along each axis whose bit is set (x 1, y 2, z
+  /// 4): the voxels that dual cells of the block before it along these axes have.
   void (*ranges)(const EncodedBlock &block, BlockRange *parts);
-  /// Which of 64 values, such as the voxels of a block, are inside: bit i.
+  /// Bit i: whether value i of 64, such as the voxels of a block, is inside.
   ulong (*inside)(const float *values, float isovalue);
-  /// Writes the hits of a tile of the frame's rays into hits [height * width], those of rays that
-  /// hit something alone. Eight rays at a time where the processor can (host_packets.hpp).
+  /// Writes the hits of a tile of the frame's rays into hits [height * width], only for rays that
+  /// hit something. Traces eight rays at a time if the processor can (host_packets.hpp).
   ///
   /// frame      its surface's box is that of the field's active blocks
   /// is_smooth  hits have smooth gradients (Normals::kSmooth)
-  /// Returns    how many there are
+  /// Returns    number of hits
   uint (*trace)(const FrameParams &frame, const HostField &field, const RayTile &tile,
                 bool is_smooth, HitRecord *hits);
-  /// The same, ray by ray: what trace() is judged by.
+  /// The same, ray by ray; trace() is compared with it.
   uint (*trace_rays)(const FrameParams &frame, const HostField &field, const RayTile &tile,
                      bool is_smooth, HitRecord *hits);
-  /// Writes the hits of rays into hits [num_rays], those of rays that hit something alone.
+  /// Writes the hits of rays into hits [num_rays], only for rays that hit something.
   ///
   /// frame      as for trace(); its view is not used
   void (*cast)(const FrameParams &frame, const HostField &field, const IndexRay *rays,
@@ -110,8 +111,8 @@ struct HostLoops {
                   const AmbientRays &rays, const HitRecord *hits, uchar *open_counts);
   /// Shades a row of the picture of the frame's hits [height * width].
   ///
-  /// samples      rays of a pixel along each axis
-  /// open_counts  [height * width] of num_ambient rays; 0: there are none
+  /// samples      rays per pixel along each axis
+  /// open_counts  [height * width] open rays among num_ambient; num_ambient 0: there are none
   /// rgb          [width / samples][3]
   void (*shade)(const FrameParams &frame, const ShadeParams &params, uint samples, uint row,
                 const HitRecord *hits, const uchar *open_counts, uint num_ambient,

@@ -1,10 +1,10 @@
 #pragma once
-// Draws isosurfaces of a compressed volume on the host, without OpenCL: pictures with the bits of a
-// device's, for as long as there is none, or its kernels are being compiled.
+// Draws isosurfaces of a compressed volume on the host, without OpenCL: pictures with a device's
+// bits, if there is no device, or while its kernels are being compiled.
 //
-// Value ranges of all blocks are made once. Rays skip what the isovalue cannot be in, macrocells of
-// 4^3 blocks, blocks, and cells whose corners are on one side; and decode the blocks that they come
-// to, which stay decoded for further frames.
+// Value ranges of all blocks are made once. Rays skip macrocells of 4^3 blocks and blocks that
+// cannot hold the isovalue, and cells whose corners are on one side. Rays decode the blocks that
+// they come to, which stay decoded for further frames.
 
 #include <cstdint>
 #include <optional>
@@ -17,18 +17,19 @@
 namespace isowave::core {
 
 struct HostRendererOptions {
-  /// Bytes of value ranges and decoded blocks; 0: a quarter of the host's memory. The same bits
-  /// with any; slower where a frame's blocks do not fit, which go and are decoded anew then.
+  /// Bound on value ranges and decoded blocks [bytes]; 0: a quarter of the host's memory. Frames
+  /// have the same bits with any limit. If a frame's blocks do not fit, they are dropped and
+  /// decoded anew, which is slower.
   std::uint64_t memory_limit = 0;
   std::uint32_t num_threads = 0;  ///< 0: one per processor
 };
 
 class HostRenderer : public Renderer {
  public:
-  /// Reads all of the finest level, for its value ranges.
+  /// Reads the whole finest level, for its value ranges.
   ///
   /// volume  must outlive the renderer
-  /// Throws  Error: the limit does not suffice; a file that the volume is in cannot be read
+  /// Throws  Error: a limit that is too small; a file that the volume is in cannot be read
   explicit HostRenderer(const CompressedVolume &volume, const HostRendererOptions &options = {});
   explicit HostRenderer(CompressedVolume &&, const HostRendererOptions & = {}) = delete;
 
@@ -39,7 +40,7 @@ class HostRenderer : public Renderer {
   /// Draws one frame. on_pass is called after each band of rows, from the top, by the calling
   /// thread; rows that were not drawn have no hits.
   ///
-  /// Throws  Error: a file cannot be read, too: then there are no hits()
+  /// Throws  Error: also a file that cannot be read; there are no hits() then
   FrameStats render(const FrameRequest &request) override;
   std::vector<HitRecord> cast_rays(std::span<const WorldRay> rays, float isovalue,
                                    Normals normals) override;
@@ -48,14 +49,14 @@ class HostRenderer : public Renderer {
   ImageSize size() const override { return size_; }
   std::vector<HitRecord> hits() override;
   std::vector<float> depth() override;
-  /// How open the hits of the last frame are.
+  /// Counts of open ambient rays of the last frame's hits.
   const OpenCounts &open() const { return open_; }
   Image8 shade(const Appearance &appearance = {}) override;
 
-  /// The memory of decoded blocks is kept for others.
+  /// Forgets all decoded blocks, and keeps their memory for other blocks.
   void clear_cache() override { blocks_.forget(); }
   std::uint64_t num_decoded_blocks() const { return blocks_.num_decoded(); }  ///< from the start
-  /// At present: value ranges and decoded blocks. Pictures come on top.
+  /// Memory at present: value ranges and decoded blocks, without pictures.
   std::uint64_t memory_bytes() const override { return blocks_.bytes(); }
 
  private:

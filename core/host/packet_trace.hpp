@@ -1,7 +1,7 @@
 #pragma once
 // Eight rays at a time through a HostField (kernels_cl/portable/packet_walk.h): the hits of the
-// scalar walk, bit for bit. For host_packets*.cpp alone, each of which compiles it for a kind of
-// processor (float8.hpp).
+// scalar walk, bit for bit. Only host_packets*.cpp include this file; each compiles it for a kind
+// of processor (float8.hpp).
 
 #include <bit>
 #include <cstddef>
@@ -15,7 +15,7 @@ namespace isowave::core::ISO_PACKET_NAMESPACE {
 
 static_assert(kDefaultSolver.kind == ISO_SOLVER_BERNSTEIN, "there is no other here");
 
-// ---- Where blocks come from: see packet_regions.h.
+// ---- The source of blocks: see packet_regions.h.
 
 using PacketField = HostField;
 
@@ -24,7 +24,7 @@ inline void macrocell_bits(const PacketField *field, Ints macrocells, Mask lanes
   gather_halves(field->masks, macrocells, lanes, low, high);
 }
 
-/// HostField::open() once for each block, of which there are few.
+/// Calls HostField::open() once for each block. Lanes have few different blocks.
 inline Mask open_blocks(const PacketField *field, const FrameParams *frame, const Ints *at,
                         Mask lanes, Ints *low, Ints *high) {
   const auto columns = static_cast<int>(frame->grid.blocks_x),
@@ -39,7 +39,7 @@ inline Mask open_blocks(const PacketField *field, const FrameParams *frame, cons
   return ints(0);
 }
 
-/// Blocks are one behind the other, so that a voxel's place is a sum of what its coordinates add.
+/// Blocks lie one behind the other, so a voxel's place is the sum of one term for each coordinate.
 inline Mask load_corners(const PacketField *field, const FrameParams *frame, const Ints *at,
                          Mask lanes, Floats *w) {
   const std::size_t row = std::size_t{ISO_BLOCK_VOXELS} * frame->grid.blocks_x,
@@ -67,7 +67,7 @@ inline Mask load_corners(const PacketField *field, const FrameParams *frame, con
 
 namespace isowave::core::ISO_PACKET_NAMESPACE {
 
-/// Rays (column, row) of the frame, those of lanes. Returns how many hit something.
+/// Traces rays (column, row) of the frame in the given lanes. Returns how many hit something.
 inline uint trace_packet(const PacketScene &scene, Ints column, Ints row, Mask lanes,
                          HitRecord *hits) {
   Packet p;

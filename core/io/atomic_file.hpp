@@ -13,8 +13,8 @@
 
 namespace isowave::core {
 
-/// What the name leads to: a file, or the name at which writing through symbolic links would make
-/// one.
+/// The place that the name leads to: a file, or the name at which writing through symbolic links
+/// would make one.
 ///
 /// Throws  Error: links go in circles
 std::filesystem::path follow_links(const std::filesystem::path &path);
@@ -111,7 +111,7 @@ class OutputGroup {
  private:
   friend class AtomicFile;
   void take(AtomicFile &&file);
-  /// Where the files of a folder are kept.
+  /// The folder in which the files of `folder` are kept until it is made.
   std::filesystem::path place_of(const std::filesystem::path &folder) const;
   void make_folders(const std::filesystem::path &folder);
 

@@ -221,7 +221,7 @@ void set_meta_encoding(const HeaderFields &fields, VoxelLayout &voxels) {
   }
 }
 
-/// Where the voxels begin in their file, which is at `offset` unless the header says otherwise.
+/// The place at which voxels begin in their file: `offset`, unless the header says otherwise.
 void set_meta_offset(const HeaderFields &fields, std::uint64_t offset, VoxelLayout &voxels) {
   voxels.offset = offset;
   const std::int64_t bytes = fields.has("HeaderSize") ? fields.integer("HeaderSize") : 0;

@@ -27,8 +27,7 @@ constexpr std::size_t kPreamble = kNpyMagic.size() + 4;
 constexpr std::size_t kAlignment = 64;          ///< numpy starts the voxels at a multiple of this
 constexpr std::uint32_t kMaxHeader = 1u << 20;  ///< no header of a plain array comes near
 
-/// What stands after `'key':` in the header, a Python dictionary in text, up to the end of the
-/// header.
+/// The text after `'key':` in the header, a Python dictionary in text, up to the end of the header.
 std::string_view value_of(std::string_view header, std::string_view key, const std::string &where) {
   std::size_t at = header.find(key);
   if (at != header.npos) at = header.find(':', at + key.size());

@@ -155,7 +155,7 @@ bool is_compressed(VoxelEncoding encoding) {
   return encoding == VoxelEncoding::kGzip || encoding == VoxelEncoding::kGzipOrZlib;
 }
 
-/// Where voxels, or the compressed data that holds them, begin in the file.
+/// The place in the file at which voxels, or the compressed data that holds them, begin.
 std::uint64_t find_begin(const VolumeHeader &header) {
   const VoxelLayout &voxels = header.voxels;
   const std::shared_ptr<const InputFile> &file = voxels.file;

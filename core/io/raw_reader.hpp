@@ -15,14 +15,14 @@
 
 namespace isowave::core {
 
-/// What a raw file's name does not say, or says wrongly. Unset fields come from the name.
+/// Replaces what a raw file's name says. Unset fields come from the name.
 struct RawOverrides {
   std::optional<glm::uvec3> dims;
   std::optional<VoxelType> type;
   std::optional<glm::dvec3> spacing;  ///< also replaces the spacing of other formats
 };
 
-/// What an Open-SciVis file name says. name is what stands before the dims.
+/// Parts of an Open-SciVis file name. name: the text before the dims.
 struct RawName {
   std::string name;
   glm::uvec3 dims{0};

@@ -1,5 +1,5 @@
 #pragma once
-// What the header of a volume file says: its grid, and where and how its voxels lie. The readers of
+// Contents of a volume file's header: its grid, and where and how its voxels lie. The readers of
 // headers (nrrd_header.hpp, meta_image_header.hpp, nifti_header.hpp) make it, open_voxels() in
 // raw_reader.hpp reads by it.
 //

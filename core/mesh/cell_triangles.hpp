@@ -2,11 +2,11 @@
 // The triangles that marching cubes makes of a cell, by the signs of its corners: a table that is
 // made from a rule, for kernels and their twin.
 //
-// On each face, the surface runs around each group of neighbouring inside corners: where two inside
-// corners lie across from each other, it separates them. Both cells of a face see the same corners,
-// so they agree, and the surface has no crack. The lines of the six faces join to closed loops, and
-// each is cut into triangles, never by a line that lies in a face: there the neighbour might have
-// the same one, and more than two triangles would share it.
+// On each face, the surface runs around each group of neighbouring inside corners. If two inside
+// corners lie across from each other, the surface separates them. Both cells of a face see the same
+// corners, so they agree, and the surface has no crack. The lines of the six faces join to closed
+// loops. Each loop is cut into triangles, never by a line that lies in a face: the neighbour might
+// have the same line, and more than two triangles would share it.
 //
 // The rule is that of VTK's tables: the same loops, and so as many triangles for all 256 signs.
 

@@ -160,7 +160,7 @@ class HostExtractor {
     field_.maker->decode(std::span(ids).first(count));
   }
 
-  /// Which voxels of a decoded dual grid are inside.
+  /// The voxels of a decoded dual grid that are inside.
   Words inside(const Entry &entry) const {
     Words result{};
     for (std::uint32_t corner = 0; corner < 8; ++corner) {

@@ -21,12 +21,12 @@ struct MeshSize {
   bool has_normals = false;
 };
 
-/// Where vertices are on the edges between voxels.
+/// Places of vertices on the edges between voxels.
 enum class VertexPlaces {
-  /// At least kLeastGap from the edge's voxels. So no two vertices meet, no triangle is without
+  /// At least kLeastGap from the edge's voxels. So no two vertices meet, every triangle has an
   /// area, and the mesh stays closed for programs that merge vertices by their positions.
   kApart,
-  kExact  ///< where the isovalue is crossed; on a voxel that equals it, vertices meet
+  kExact  ///< where the field equals the isovalue; vertices meet on a voxel that equals it
 };
 /// Least distance of a vertex from the voxels of its edge [edge lengths]. Two neighbours that are
 /// rounded to float32, each off by kPositionError at most, stay apart.
@@ -66,9 +66,10 @@ class MeshPlacement {
   /// block   whose vertex it is
   /// vertex  its edge's bits 0..7 and t are used
   glm::dvec3 position(const glm::uvec3 &block, const MeshVertex &vertex) const;
-  /// gradient: index space. 0 where that is 0.
+  /// The unit normal in world space of a gradient in index space; 0 if the gradient is 0.
   glm::vec3 normal(const Gradient &gradient) const;
-  /// Turned round where the volume's axes are left-handed, so that it is seen from the same side.
+  /// The triangle, turned round if the volume's axes are left-handed, so that it is seen from the
+  /// same side.
   Triangle triangle(const MeshTriangle &triangle) const {
     return mirrored_ ? Triangle{triangle.a, triangle.c, triangle.b}
                      : Triangle{triangle.a, triangle.b, triangle.c};

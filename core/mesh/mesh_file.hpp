@@ -73,8 +73,8 @@ class MeshFile : public MeshSink {
   /// Throws  Error: it cannot be written, or the mesh is larger than the format allows
   void commit(const Progress &progress = {});
 
-  /// What is to be added to the file's positions [world units]; 0 if they are world positions. Ask
-  /// after all parts.
+  /// Offset that makes world positions of the file's positions [world units]; 0 if they are world
+  /// positions. Call it after all parts.
   glm::dvec3 offset() const;
   /// One line for users if programs that read the file do not know of its offset; else empty.
   std::string notice() const;

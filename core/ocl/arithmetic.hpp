@@ -29,7 +29,7 @@ struct Computed {
 /// Throws  Error: the kernel does not build, or the device fails
 Computed compute_on(Device &device, std::span<const Operands> operands);
 
-/// What the self-test says of a device.
+/// Result of a device's self-test.
 struct SelfTest {
   std::string notice;  ///< one line on what it computes otherwise than the host, or nothing
   /// Work-items of a group. The self-test's kernel is as small as a kernel can be: none may have

@@ -19,10 +19,10 @@ namespace isowave::core::ocl {
 /// A moved-from buffer holds nothing: size 0, no memory, not in the ledger.
 class RawBuffer {
  public:
-  /// Allocates `bytes` (1 for 0), all zero, and waits: a budget counts what is really there. Where
-  /// the device is_in_process(), pages take no memory until they are written to.
+  /// Allocates `bytes` (1 for 0), all zero, and waits, so that a budget counts memory that is
+  /// really there. If the device is_in_process(), pages take no memory until they are written to.
   ///
-  /// Throws  Error: the device cannot
+  /// Throws  Error: the device cannot allocate them
   RawBuffer(Device &device, std::string name, std::size_t bytes);
   ~RawBuffer();
   RawBuffer(RawBuffer &&) noexcept;
@@ -35,7 +35,7 @@ class RawBuffer {
 
  protected:
   void write_bytes(const void *src, std::size_t bytes, std::size_t offset, bool blocking);
-  /// Sets *event, where given, even for 0 bytes.
+  /// Sets *event, if given, even for 0 bytes.
   void read_bytes(void *dst, std::size_t bytes, std::size_t offset, bool blocking,
                   cl::Event *event) const;
   /// On the transfer queue, which is flushed. A null `after` is no event to wait for.

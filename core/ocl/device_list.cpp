@@ -241,8 +241,7 @@ const DeviceInfo &pick_device(std::span<const DeviceInfo> devices, std::string_v
   if (devices.empty() && !has_room_for_driver()) {
     throw Error(
         "out of memory: an OpenCL driver needs {} MiB of address space, and this process cannot "
-        "get "
-        "as much: raise its limit (ulimit -v)",
+        "get as much: raise its limit (ulimit -v)",
         bytes_of_driver() >> 20);
   }
   if (devices.empty()) {

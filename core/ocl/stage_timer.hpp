@@ -1,6 +1,6 @@
 #pragma once
-// Milliseconds per pipeline stage, from OpenCL events; where a driver reports event times of 0
-// (Mesa rusticl 22.3), from the wall clock around a finish. Costs nothing when off.
+// Milliseconds per pipeline stage, from OpenCL events. If a driver reports event times of 0 (Mesa
+// rusticl 22.3), they come from the wall clock around a finish. Costs nothing when off.
 //
 //   { const auto stage = device.timer().stage("traverse");  traverse_kernel_(...); ... }
 //   device.timer().collect()   // waits; name -> ms since the last collect()

@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <limits>
 #include <stdexcept>
 
 #include "core/base/error.hpp"
 #include "core/base/ms_since.hpp"
+#include "core/host/host_renderer.hpp"
 
 namespace isowave::core {
 
@@ -62,7 +64,7 @@ MeshRenderer::MeshRenderer(ocl::Device &device, const CompressedVolume &volume,
                            const MeshRendererOptions &options)
     : device_(device),
       options_(options),
-      info_(volume.info),
+      volume_(volume),
       blocks_(device, volume, block_options(device, options)),
       block_triangles_(device),
       rasterise_(device, options.size.num_rays()),
@@ -257,62 +259,83 @@ void MeshRenderer::draw_batches() {
   }
 }
 
-MeshFrameStats MeshRenderer::render(const Camera &camera, float isovalue,
-                                    std::optional<ImageSize> size) {
+Abilities MeshRenderer::abilities() const {
+  Abilities abilities;
+  abilities.largest = options_.size;
+  abilities.most_rays = options_.size.num_rays();
+  abilities.parallel = false;
+  return abilities;
+}
+
+FrameStats MeshRenderer::render(const FrameRequest &request) {
   const auto begin = std::chrono::steady_clock::now();
-  const ImageSize picture = size.value_or(options_.size);
-  check_image_size(picture);
-  if (camera.parallel_height)
-    throw Error("triangles are drawn in perspective alone: leave out parallel projection");
-  if (picture.num_rays() > options_.size.num_rays()) {
-    throw Error("{}x{} pixels have more than the {} rays that the renderer was made for",
-                picture.width, picture.height, options_.size.num_rays());
-  }
-  FrameParams frame = make_frame_params(info_, camera, picture, isovalue);
+  check(request, abilities());
+  const ImageSize picture = size_of(request, abilities());
+  const FrameParams frame =
+      make_frame_params(volume_.info, request.camera, picture, request.isovalue);
   const std::uint64_t decoded_before = blocks_.num_decoded();
-  MeshFrameStats stats;
+  MeshFrameStats mesh;
   has_picture_ = false;
   try {
-    stats.is_new_surface = isovalue_ != isovalue;
-    if (stats.is_new_surface) {
-      find_surface(isovalue);
+    mesh.is_new_surface = isovalue_ != request.isovalue;
+    if (mesh.is_new_surface) {
+      find_surface(request.isovalue);
       if (is_kept_) {
         device_.finish();
-        stats.surface_ms = ms_since(begin);
+        mesh.surface_ms = ms_since(begin);
       }
     }
-    frame_ = frame;
-    size_ = picture;
-    num_parts_ = 0;
-    {
-      const auto stage = device_.timer().stage("rasterise");
-      blocks_.rays().frame = frame_;
-      rasterise_.clear(blocks_.rays());
-      if (is_kept_ && num_triangles_ != 0) {
-        rasterise_(*mesh_, static_cast<std::uint32_t>(num_triangles_), blocks_.rays());
-        num_parts_ = 1;
-      }
-    }
-    if (!is_kept_) draw_batches();
+    draw(frame);
     device_.finish();
   } catch (...) {  // blocks may have slots, but no values
     drop_all();
     throw;
   }
-  blocks_.rays().frame = frame_;  // for shading
+  size_ = picture;
   has_picture_ = true;
-  stats.is_kept = is_kept_;
-  stats.listed_blocks = num_listed_;
-  stats.needed_blocks = num_needed_;
-  stats.cached_blocks = blocks_.num_cached();
-  stats.decoded_blocks = blocks_.num_decoded() - decoded_before;
-  stats.cache_slots = blocks_.num_slots();
-  stats.num_triangles = num_triangles_;
-  stats.num_parts = num_parts_;
-  stats.device_bytes = bytes_in_use();
+  mesh.is_kept = is_kept_;
+  mesh.listed_blocks = num_listed_;
+  mesh.needed_blocks = num_needed_;
+  mesh.cached_blocks = blocks_.num_cached();
+  mesh.decoded_blocks = blocks_.num_decoded() - decoded_before;
+  mesh.cache_slots = blocks_.num_slots();
+  mesh.num_triangles = num_triangles_;
+  mesh.num_parts = num_parts_;
+  mesh.device_bytes = bytes_in_use();
+  FrameStats stats;
+  PassStats &pass = stats.passes.emplace_back();
+  pass.counts.decoded_count = static_cast<uint>(mesh.decoded_blocks);
+  pass.completed_percent = 100;
   stats.total_ms = ms_since(begin);
-  stats.draw_ms = stats.total_ms - stats.surface_ms;
+  mesh.draw_ms = stats.total_ms - mesh.surface_ms;
+  last_ = mesh;
+  if (request.on_pass) request.on_pass(pass);
   return stats;
+}
+
+/// Draws the surface at hand.
+void MeshRenderer::draw(const FrameParams &frame) {
+  frame_ = frame;
+  num_parts_ = 0;
+  {
+    const auto stage = device_.timer().stage("rasterise");
+    blocks_.rays().frame = frame_;
+    rasterise_.clear(blocks_.rays());
+    if (is_kept_ && num_triangles_ != 0) {
+      rasterise_(*mesh_, static_cast<std::uint32_t>(num_triangles_), blocks_.rays());
+      num_parts_ = 1;
+    }
+  }
+  if (!is_kept_) draw_batches();
+  blocks_.rays().frame = frame_;  // for shading
+}
+
+std::vector<HitRecord> MeshRenderer::cast_rays(std::span<const WorldRay>, float, Normals) {
+  throw Error("drawn triangles answer no rays of any origin: draw by a ray pipeline");
+}
+
+Camera MeshRenderer::camera(std::span<const float> isovalues, std::optional<ImageSize> size) {
+  return HostRenderer(volume_).camera(isovalues, size.value_or(options_.size));
 }
 
 std::vector<HitRecord> MeshRenderer::hits() {
@@ -322,9 +345,14 @@ std::vector<HitRecord> MeshRenderer::hits() {
   return hits;
 }
 
+std::uint64_t MeshRenderer::num_hits(const FrameStats &) {
+  return static_cast<std::uint64_t>(
+      std::ranges::count_if(hits(), [](const HitRecord &hit) { return std::isfinite(hit.t); }));
+}
+
 Image8 MeshRenderer::shade(const Appearance &appearance) {
   if (!has_picture_) throw Error("there is no picture: no frame has been drawn");
-  return shade_(make_shade_params(info_, appearance), blocks_.rays(), size_.samples);
+  return shade_(make_shade_params(volume_.info, appearance), blocks_.rays(), size_.samples);
 }
 
 }  // namespace isowave::core

@@ -17,11 +17,11 @@
 #include <vector>
 
 #include "core/extract/surface_blocks.hpp"
+#include "core/frame/renderer.hpp"
 #include "core/paper/block_triangles.hpp"
 #include "core/paper/rasterise.hpp"
 #include "core/stages/prefix_sum.hpp"
 #include "core/stages/shade.hpp"
-#include "core/view/camera.hpp"
 
 namespace isowave::core {
 
@@ -31,7 +31,7 @@ struct MeshRendererOptions {
   StreamPlace stream = StreamPlace::kAuto;  ///< where the compressed volume is
 };
 
-/// The cost of a frame.
+/// What a frame took, beside FrameStats.
 struct MeshFrameStats {
   bool is_new_surface = false;      ///< the blocks of the isovalue were found in this frame
   bool is_kept = false;             ///< the mesh stays on the device, for the next frame
@@ -44,12 +44,13 @@ struct MeshFrameStats {
   std::uint32_t num_parts = 0;     ///< that the mesh was drawn in
   std::uint64_t device_bytes = 0;  ///< of all buffers
   double surface_ms = 0;  ///< until the mesh was there; 0 where it is not kept, or was there
-  double draw_ms = 0;     ///< the rest
-  double total_ms = 0;    ///< wall clock, from camera to finished hit buffer on the device
+  double draw_ms = 0;     ///< the rest of FrameStats::total_ms
 };
 
-/// Not thread-safe, as the device.
-class MeshRenderer {
+/// Hits have the same bits on every device and with every budget. They differ from those of the ray
+/// pipelines as triangles do from the trilinear surface; gradients are the triangles' normals,
+/// directions alone, whatever FrameRequest::normals asks for.
+class MeshRenderer : public Renderer {
  public:
   /// Uploads the volume and builds its macrocell ranges.
   ///
@@ -59,26 +60,30 @@ class MeshRenderer {
   MeshRenderer(ocl::Device &device, const CompressedVolume &volume,
                const MeshRendererOptions &options);
 
-  /// Draws one frame. Its hits have the same bits on every device and with every budget. They
-  /// differ from those of the ray pipelines as triangles do from the trilinear surface; gradients
-  /// are the triangles' normals, directions alone.
+  Abilities abilities() const override;
+  std::vector<VolumeInfo> levels() const override { return {volume_.info}; }
+
+  /// Has one pass, after which on_pass is called.
   ///
-  /// size    none: the renderer's largest
-  /// Throws  Error: the size or the isovalue is out of range, a budget that is too small, a surface
-  ///         that is too large for the device
-  /// Waits   yes
-  MeshFrameStats render(const Camera &camera, float isovalue, std::optional<ImageSize> size = {});
+  /// Returns  rays_hit 0: see num_hits()
+  /// Throws   Error: a budget that is too small, a surface that is too large for the device, too
+  FrameStats render(const FrameRequest &request) override;
+  /// Throws  Error: triangles are drawn from a camera alone
+  std::vector<HitRecord> cast_rays(std::span<const WorldRay> rays, float isovalue,
+                                   Normals normals) override;
+  Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {}) override;
 
-  /// Returns  the hit buffer of the last frame, as DeviceRenderer::hits()
-  /// Throws   Error: no frame was drawn
-  /// Waits    yes
-  std::vector<HitRecord> hits();
-  /// Returns  the picture of the hit buffer, as DeviceRenderer::shade()
-  Image8 shade(const Appearance &appearance = {});
+  /// What the last frame took; of none, zeros.
+  const MeshFrameStats &last_frame() const { return last_; }
+  ImageSize size() const override { return size_; }
+  std::vector<HitRecord> hits() override;
+  Image8 shade(const Appearance &appearance = {}) override;
+  /// Counts the hits of the last frame: render() does not.
+  std::uint64_t num_hits(const FrameStats &stats) override;
 
-  /// Forgets the mesh and all decoded blocks, so that the next frame is a cold one: for
-  /// measurements. Their memory stays.
-  void clear_cache();
+  /// Forgets the mesh, too. The memory stays.
+  void clear_cache() override;
+  std::uint64_t memory_bytes() const override { return bytes_in_use(); }
 
  private:
   /// The surface at hand, on the device.
@@ -91,6 +96,7 @@ class MeshRenderer {
     PrefixSum sum;
   };
 
+  void draw(const FrameParams &frame);
   void drop_all();
   void find_surface(float isovalue);
   void make_lists();
@@ -105,7 +111,7 @@ class MeshRenderer {
 
   ocl::Device &device_;
   MeshRendererOptions options_;
-  VolumeInfo info_;
+  const CompressedVolume &volume_;
   SurfaceBlocks blocks_;
   BlockTriangles block_triangles_;
   Rasterise rasterise_;
@@ -120,6 +126,7 @@ class MeshRenderer {
   bool is_kept_ = false;  ///< mesh_ has all triangles
   std::uint32_t num_parts_ = 0;
   bool has_picture_ = false;
+  MeshFrameStats last_;
 };
 
 }  // namespace isowave::core

@@ -1,6 +1,6 @@
 #pragma once
-// Files that get their name, their rights and their place when they are finished, and who may write
-// where.
+// Files that get their name, their rights and their place when they are finished; which users may
+// write to a folder.
 
 #include <cstdint>
 #include <cstdio>

@@ -14,18 +14,18 @@ namespace isowave::core {
 
 namespace {
 
-/// Caches of fewer slots may run out of them within one pass, unless they are made for what a frame
-/// needs (MemoryPlan::can_grow()), or for all blocks.
+/// Caches with fewer slots may run out of slots within one pass, unless they are made for the
+/// blocks that a frame needs (MemoryPlan::can_grow()), or for all blocks.
 constexpr std::uint32_t kSmallCache = 1u << 16;
-/// Slots are scarce where fewer than one of so many are free.
+/// Slots are scarce if fewer than one of so many are free.
 constexpr std::uint32_t kScarcePart = 8;
 
-/// A frame that freed more slots than these of blocks that it had asked for leaves nothing of use
-/// to the next. What is left of a ray's blocks makes it wait once for each that is gone. To a GPU
-/// such passes cost more than decoding all anew: H100, 512^3, frames that come again take 1.2 ms
-/// with 90,000 slots, 1.4 with 85,000 and 1.9 with 70,000 where blocks are kept, cold ones 1.3.
-/// Where blocks take longer, since a CPU decodes them or they must be uploaded first, more are
-/// worth keeping: PoCL, 80,000 and 65,536 slots, 123 and 138 ms, cold 154 and 146.
+/// If a frame has freed more slots than these of blocks that it had requested, the blocks that are
+/// left do not help the next frame: a ray waits once for each of its blocks that is gone. On a GPU,
+/// such passes cost more than decoding all blocks anew. H100, 512^3, blocks kept: frames that come
+/// again take 1.2 ms with 90,000 slots, 1.4 with 85,000 and 1.9 with 70,000; cold frames 1.3. If a
+/// CPU decodes blocks, or they must be uploaded first, more are worth keeping. PoCL, 80,000 and
+/// 65,536 slots: 123 and 138 ms; cold 154 and 146.
 std::uint32_t most_recycled(std::uint32_t num_slots, ocl::DeviceType type, StreamPlace stream) {
   return num_slots / (type == ocl::DeviceType::kCpu || stream == StreamPlace::kHost ? 2 : 8);
 }
@@ -184,8 +184,8 @@ void BlockStore::provide(const CountsBuffer &asked, LevelRange of, Wavefront &ra
 
 void BlockStore::note(const PassCounts &counts) {
   // A launch that is not needed costs more than a pass that finds slots missing now and then. The
-  // counts are a pass old: its requests have taken slots since, and the pass after it may have
-  // asked for as many.
+  // counts are a pass old: that pass's requests have taken slots since, and the pass after it may
+  // have requested as many.
   const std::uint64_t spoken_for = 2 * std::uint64_t{counts.requested_count};
   slots_are_scarce_ =
       is_small_ ||
@@ -198,9 +198,9 @@ void BlockStore::close(std::uint64_t recycled, bool goes_on) {
   wanted_slots_ = std::max(wanted_slots_, grown_cache_slots(plan, recycled));
 }
 
-/// Between frames: a cache of wanted_slots_, without a block. What there was is freed first, so
-/// that the plan is kept. Where the device has not so much memory after all, the cache stays as
-/// large as it was, or becomes smaller, and never grows again; pictures do not depend on it.
+/// Makes an empty cache of wanted_slots_, between frames. The old cache is freed first, so that the
+/// plan is kept. If the device has not enough memory, the cache keeps its size, or becomes smaller,
+/// and never grows again. Pictures do not depend on it.
 void BlockStore::grow(Wavefront &rays) {
   if (wanted_slots_ == plan.cache_slots) return;
   const std::uint32_t before = plan.cache_slots;

@@ -1,7 +1,8 @@
 #pragma once
 // The blocks of a volume on a device: compressed, by level of detail, and decoded, in a cache. The
-// store remembers what the last pass asked for, so that the next one finds it decoded, whichever
-// wave both belong to; and what a frame lacked, so that the cache grows before the next.
+// store remembers the blocks that the last pass requested, so that the next pass finds them
+// decoded, even if it belongs to another wave. It also remembers the slots that a frame lacked, so
+// that the cache grows before the next frame.
 
 #include <cstdint>
 #include <functional>
@@ -23,13 +24,13 @@ namespace isowave::core {
 /// The volume on the device, or one of its levels of detail.
 struct Level {
   VolumeInfo info;
-  BlockPrecision precision;  ///< of its blocks
-  LevelError error;          ///< of its field against the volume's
+  BlockPrecision precision;  ///< precision of its blocks
+  LevelError error;          ///< error of its field against the volume's
   DeviceStream stream;
   Macrocells macrocells;
   ZfpDecode decode;
   FrameParams frame{};     ///< its part of the frame at work
-  double range_error = 0;  ///< of voxels of fewer bit planes, at most
+  double range_error = 0;  ///< largest error of voxels of fewer bit planes
 };
 
 /// Levels of detail: from `first` to below `end`.
@@ -37,10 +38,10 @@ struct LevelRange {
   std::size_t first = 0, end = 1;
 };
 
-/// What voxels of a level are decoded to.
+/// The values that voxels of a level are decoded to.
 struct DecodedValues {
   StreamLayout layout;
-  double range_error;  ///< of voxels of fewer bit planes, at most
+  double range_error;  ///< largest error of voxels of fewer bit planes
 };
 
 struct Uploads {
@@ -49,33 +50,32 @@ struct Uploads {
 
 class BlockStore {
  public:
-  /// The finest level alone, with as many slots as the limits say.
+  /// A store of only the finest level, with as many slots as the limits say.
   ///
-  /// volume  of `stream`, which is on the device or on its way there
+  /// volume  the volume of `stream`, which is on the device or on its way there
   /// Waits   yes
   BlockStore(ocl::Device &of, const CompressedVolume &volume, DeviceStream stream,
              const BlockCache::Limits &limits, std::uint32_t group_size);
 
   /// Uploads the volume, if it goes to the device, and computes the value ranges of its blocks.
   ///
-  /// Throws  Error: the device's memory does not suffice; a file states wrong ranges of values
+  /// Throws  Error: not enough memory on the device; a file states wrong ranges of values
   /// Waits   yes
   BlockStore(ocl::Device &of, const CompressedVolume &volume, const RendererOptions &options,
              MemoryPlan made_by);
 
-  /// Opens a frame: the cache grows if the frame before lacked slots; levels and their active
-  /// blocks become the frame's, decoded values those that it asks for. Sets rays.frame and
-  /// rays.level_frames.
+  /// Opens a frame: grows the cache if the frame before lacked slots, and sets levels, their active
+  /// blocks and the values of decoded blocks for this frame. Sets rays.frame and rays.level_frames.
   ///
-  /// frames  of all levels
-  /// values  of all levels; if others are cached, the cache is cleared
-  /// source  of the frame's first wave
+  /// frames  constants of all levels
+  /// values  decoded values of all levels; if others are cached, the cache is cleared
+  /// source  rays of the frame's first wave
   /// Throws  Error: the device has no memory for a cache of any size
   /// Waits   if the cache grows
   void open(Wavefront &rays, std::vector<FrameParams> frames,
             const std::vector<DecodedValues> &values, FieldBound bound, RaySource source);
 
-  /// Begins a pass: the blocks that the pass before asked for get slots and values.
+  /// Begins a pass: gives slots and values to the blocks that the pass before requested.
   ///
   /// rays    after Wavefront::open_pass()
   /// Throws  Error: a file that blocks are read from has become shorter. The cache is empty then.
@@ -83,30 +83,30 @@ class BlockStore {
   void provide(Wavefront &rays) {
     if (asked_) provide(rays.previous_counts, *asked_, rays);
   }
-  /// Begins a pass whose requests the host makes, and which is a frame of its own: slots are freed
-  /// in the order in which such passes have used them.
+  /// Begins a pass whose requests the host makes. Each such pass is a frame of its own: slots are
+  /// freed in the order in which such passes have used them.
   ///
   /// Out    rays.counts
   /// Waits  yes
   void begin_host_pass(Wavefront &rays);
-  /// The same for requests that `asked` counts, of those levels.
+  /// Provides the blocks of the requests that `asked` counts, for those levels.
   void provide(const CountsBuffer &asked, LevelRange of, Wavefront &rays);
 
-  /// The pass that was just enqueued may have asked for blocks.
+  /// Call it after a pass that may have requested blocks was enqueued.
   void expect_requests() { asked_ = drawing; }
-  /// No ray is left that waits for a block.
+  /// Call it if no ray is left that waits for a block.
   void forget_requests() { asked_.reset(); }
-  /// Blocks may have been asked for that have not been provided.
+  /// Whether there may be requests that were not provided.
   bool has_requests() const { return asked_.has_value(); }
 
-  /// Takes note of what a pass has left: whether the next ones may run out of slots.
+  /// Takes note of a pass's counts, which say if the next passes may run out of slots.
   void note(const PassCounts &counts);
   /// Closes a frame, or a part of one.
   ///
-  /// recycled     slots that it has freed of blocks that it had asked for itself: if they are many,
-  ///              the cache grows at the next open()
-  /// goes_on      the next frame goes on with its blocks. If it does not, and what is left of them
-  ///              would slow the next frame down, the cache is emptied.
+  /// recycled     slots that the frame has freed of blocks that it had requested itself: if they
+  ///              are many, the cache grows at the next open()
+  /// goes_on      whether the next frame goes on with these blocks. If not, and the blocks that are
+  ///              left would slow the next frame down, the cache is emptied.
   /// Waits        no
   void close(std::uint64_t recycled, bool goes_on);
 
@@ -116,13 +116,13 @@ class BlockStore {
   void clear();
   /// As BlockCache::resize(), with what depends on it. No ray of the frame before is left.
   void resize(const BlockCache::Limits &limits, Wavefront &rays);
-  /// What has to follow when the number of slots becomes another one. It may throw Error.
+  /// Called when the number of slots has changed. It may throw Error.
   std::function<void(std::uint32_t num_slots)> on_resize;
-  /// What was uploaded since the store was made, of a volume that stays on the host.
+  /// Uploads since the store was made, if the volume stays on the host.
   Uploads uploads() const;
 
   ocl::Device &device;
-  MemoryPlan plan;  ///< of the renderer, with the slots that the cache has now
+  MemoryPlan plan;  ///< the renderer's plan, with the slots that the cache has now
   std::vector<Level> levels;
   BlockCache cache;
   LevelRange drawing{};  ///< the frame at work
@@ -134,12 +134,12 @@ class BlockStore {
   void grow(Wavefront &rays);
   void decode_as(const std::vector<DecodedValues> &values);
 
-  std::uint32_t wanted_slots_ = 0;        ///< from the next frame on
+  std::uint32_t wanted_slots_ = 0;        ///< slots from the next frame on
   bool is_small_ = false;                 ///< slots may run out within one pass
   bool slots_are_scarce_ = true;          ///< free slots may not suffice for the next passes
-  Schedule schedule_{};                   ///< of every frame, but for table_groups
+  Schedule schedule_{};                   ///< every frame's, except table_groups
   std::optional<LevelRange> asked_;       ///< levels whose blocks the last pass may have asked for
-  std::optional<float> cached_isovalue_;  ///< of the cache's bits of voxels inside; none: empty
+  std::optional<float> cached_isovalue_;  ///< isovalue of the cache's bits of voxels inside
 };
 
 }  // namespace isowave::core

@@ -20,7 +20,7 @@ namespace isowave::core {
 
 namespace {
 
-/// Slots that the frame has freed of blocks that it had asked for itself.
+/// Slots that the frame has freed of blocks that it had requested itself.
 std::uint64_t recycled_blocks(const FrameStats &stats) {
   std::uint64_t sum = stats.normals.recycled_blocks + stats.ambient.recycled_blocks;
   for (const PassStats &pass : stats.passes) sum += pass.counts.recycled_count;
@@ -61,7 +61,7 @@ FrameStats DeviceRenderer::render(const FrameRequest &request) {
   const std::pair view(request.camera, request.isovalue);
   bool &took_one_pass = took_one_pass_[last_view_ == view];
   last_view_ = view;
-  // If a single pass was enough for the last such frame, normals begin right behind the first.
+  // If one pass was enough for the last such frame, normals begin right behind the first pass.
   blocks_.counts_touched = in_step(request.on_pass);
   run(*camera_rays_, frame, is_smooth && took_one_pass ? &normals_of_camera_ : nullptr);
   blocks_.counts_touched = false;
@@ -82,11 +82,11 @@ FrameStats DeviceRenderer::render(const FrameRequest &request) {
   return std::move(stats);
 }
 
-/// The passes of one wave, until no ray of it is left, or on_pass says to stop. Does nothing in a
-/// frame that was stopped.
+/// Runs the passes of one wave until none of its rays is left, or on_pass says to stop. Does
+/// nothing in a frame that was stopped.
 ///
-/// next  the wave that follows, if it may begin behind the first pass, without waiting for the
-///       host. Should this wave need more passes, the next has done nothing.
+/// next  the wave that follows, if it may begin behind the first pass without waiting for the host.
+///       If this wave needs more passes, the next one has done nothing.
 void DeviceRenderer::run(Wave &wave, Frame &frame, Wave *next) {
   if (frame.stats.cancelled) return;
   const auto begin = std::chrono::steady_clock::now();
@@ -159,11 +159,11 @@ DeviceRenderer::DeviceRenderer(ocl::Device &device, const CompressedVolume &volu
   setup_ms_ = ms_since(setup_begin_) - (device.compile_ms() - compile_ms_before_);
 }
 
-/// Launches whatever frames will launch. PoCL and Mesa compile a kernel when it is launched first,
-/// PoCL for each work-group size, and anew for more than 65,535 work-items. So the passes
-/// themselves run, of a frame of one pixel that meets nothing: what is launched here cannot differ
-/// from what frames launch, and all kernels leave by the exits they have for empty lists. Costs no
-/// time that grows with the volume; all that it leaves is one hit, which every frame clears.
+/// Launches all kernels that frames will launch. PoCL and Mesa compile a kernel when it is launched
+/// first, PoCL for each work-group size, and anew for more than 65,535 work-items. So the passes of
+/// a frame of one pixel run here, which meets nothing: they launch what frames launch, and kernels
+/// leave by their exits for empty lists. The time does not grow with the volume. One hit is left
+/// behind, which every frame clears.
 void DeviceRenderer::compile_kernels() {
   const auto compiling = device_.compiling();
   Wavefront &rays = rays_;
@@ -226,7 +226,7 @@ void DeviceRenderer::begin_frame(const FrameRequest &request) {
 void DeviceRenderer::open_frame(std::vector<FrameParams> frames,
                                 const std::vector<DecodedValues> &values, FieldBound bound,
                                 RaySource source) {
-  passes_.drain();  // what the frame before had enqueued beyond its last pass
+  passes_.drain();  // passes that the frame before had enqueued beyond its last one
   blocks_.open(rays_, std::move(frames), values, bound, source);
   options_.cache_slots = blocks_.plan.cache_slots;
 }
@@ -244,8 +244,8 @@ PassStats DeviceRenderer::stats_of(const PassCounts &counts) {
   return stats;
 }
 
-/// What the request makes of each level's blocks. Throws Error where the error is not known that a
-/// bound needs.
+/// The values that the request has each level's blocks decoded to. Throws Error if a bound needs an
+/// error that is not known.
 std::vector<DecodedValues> DeviceRenderer::decoded_values(const FrameRequest &request) const {
   std::vector<DecodedValues> values;
   for (const Level &level : blocks_.levels) {
@@ -282,7 +282,7 @@ std::vector<HitRecord> DeviceRenderer::cast_rays(std::span<const WorldRay> world
   const std::vector<IndexRay> rays = make_index_rays(blocks_.levels[0].info, world_rays);
   Wavefront &wavefront = rays_;
   const FrameOfPicture kept{wavefront, wavefront.frame};
-  // As many as the buffers hold at a time, seen as a picture.
+  // As many rays as the buffers hold at a time, as a picture.
   const auto columns = static_cast<std::uint32_t>(
       std::min<std::uint64_t>({kGivenColumns, wavefront.num_rays, rays.size()}));
   std::vector<HitRecord> hits, part;

@@ -28,33 +28,33 @@ namespace isowave::core {
 
 class DeviceRenderer : public Renderer {
  public:
-  /// Uploads the volume, builds its macrocell ranges and every buffer of the frame, and has the
-  /// kernels compiled; nothing is allocated or compiled later.
+  /// Uploads the volume, builds its macrocell ranges and every buffer of the frame, and compiles
+  /// the kernels. Nothing is allocated or compiled later, except a larger cache.
   ///
   /// device   must outlive the renderer
-  /// volume   need not, unless it stays on the host (memory_plan().stream)
-  /// options  capacities: what no request may exceed
-  /// Throws   Error: options out of range, the device's memory or the budget does not suffice
+  /// volume   must outlive the renderer if it stays on the host (memory_plan().stream)
+  /// options  limits of all requests
+  /// Throws   Error: options out of range, not enough device memory or budget
   /// Waits    yes
   DeviceRenderer(ocl::Device &device, const CompressedVolume &volume,
                  const RendererOptions &options);
 
-  /// Draws one frame. Decoded blocks stay in the cache for the next frame, whatever its isovalue,
-  /// unless that asks for other values (voxel_error, bound), or this one needed many more than
-  /// there are slots.
+  /// Draws one frame. Decoded blocks stay in the cache for the next frame, of any isovalue, unless
+  /// that frame asks for other values (voxel_error, bound), or this frame needed many more blocks
+  /// than there are slots.
   ///
-  /// Returns  what the passes did, and how long they took [ms]
+  /// Returns  counts and times [ms] of the passes
   /// Throws   Error: a request that is out of range or that the renderer was not made for; a file
-  ///          that blocks are read from has become shorter. The next frame is not affected.
+  ///          that blocks are read from has become shorter. Further frames can be drawn.
   /// Waits    yes
   FrameStats render(const FrameRequest &request) override;
 
-  /// What a renderer with such options can draw.
+  /// The abilities of a renderer with such options.
   static Abilities abilities_of(const RendererOptions &options);
   Abilities abilities() const override { return abilities_of(options_); }
   std::vector<VolumeInfo> levels() const override;
 
-  /// The box around the blocks that isosurfaces may be in; none: in no block.
+  /// The box around the blocks that isosurfaces may be in; none if they are in no block.
   ///
   /// Throws  Error: an isovalue is NaN
   /// Waits   yes
@@ -65,43 +65,43 @@ class DeviceRenderer : public Renderer {
                                    Normals normals) override;
 
   std::vector<HitRecord> hits() override;
-  /// Puts other hits in the place of the last frame's: what shade() shows.
+  /// Replaces the last frame's hits, which shade() shows.
   ///
   /// hits    [size.ray_rows()][size.ray_columns()]
   /// Throws  Error: no frame was drawn
   /// Waits   yes
   void set_hits(std::span<const HitRecord> hits);
   Image8 shade(const Appearance &appearance = {}) override;
-  /// The picture of the hit buffer, RGBA in words, red in bits 0..7: A is 0 where no ray of a pixel
+  /// The picture of the hit buffer, RGBA in words, red in bits 0..7; A is 0 if no ray of a pixel
   /// hits.
   std::vector<std::uint32_t> shade_packed(const Appearance &appearance);
-  /// How open the hits of the last frame are, as far as its ambient rays are through.
+  /// Counts of open ambient rays of the last frame's hits, for its finished rounds.
   ///
   /// Throws  Error: no frame was drawn
   /// Waits   yes
   OpenCounts open() const;
 
-  // For bricks, of which pictures are put together (core/bricks): a brick's own frames have no
-  // ambient rays, since these go on in others.
+  // For bricks, whose pictures are put together (core/bricks). A brick's own frames have no ambient
+  // rays, since these go on in other bricks.
 
   /// hits() as all bricks can read them, of any level of detail: see placed_hit().
   std::vector<HitRecord> placed_hits();
-  /// Begins the rounds of ambient rays of a frame that was drawn last and is not cancelled. They
-  /// leave the placed hits of all bricks, in the place of the brick's own.
+  /// Begins the rounds of ambient rays of the last frame, which was not cancelled. Rays start at
+  /// the placed hits of all bricks, which replace the brick's own.
   ///
-  /// levels   of detail that draw the frame of the whole volume
+  /// levels   levels of detail that draw the frame of the whole volume
   /// Throws   Error: no frame was drawn; the renderer is not a brick's, or was made without given
   ///          rays
   /// Waits    yes
   void begin_ambient(const FrameRequest &request, std::vector<HitRecord> placed, LevelRange levels);
-  /// Casts a round of them through this brick.
+  /// Casts a round of ambient rays through this brick.
   ///
   /// round    0..num_rounds - 1
-  /// Returns  bits [(rays + 63) / 64]: the rays that meet a surface in this brick
+  /// Returns  bits [(rays + 63) / 64]: 1 if the ray meets a surface in this brick
   /// Waits    yes
   std::vector<std::uint64_t> blocked_rays(std::uint32_t round, std::uint32_t num_rounds,
                                           LaterPasses &stats);
-  /// What shade() takes for open(). Waits.
+  /// Sets the counts that shade() uses instead of open(). Waits.
   void set_open(const OpenCounts &open);
 
   /// These three throw Error without options().with_kept_picture.
@@ -115,16 +115,16 @@ class DeviceRenderer : public Renderer {
   std::uint64_t memory_bytes() const override { return blocks_.plan.total(); }
   const RendererOptions &options() const { return options_; }     ///< with the defaults filled in
   const MemoryPlan &memory_plan() const { return blocks_.plan; }  ///< every buffer that there is
-  /// The finest level's.
+  /// The macrocells of the finest level.
   const Macrocells &macrocells() const { return blocks_.levels[0].macrocells; }
-  /// Upload and macrocell ranges, without Device::compile_ms().
+  /// Time of upload and macrocell ranges, without Device::compile_ms().
   double setup_ms() const override { return setup_ms_; }
 
  private:
   /// The frame at work.
   struct Frame {
     const OnPass &on_pass;
-    std::uint32_t waves_left;  ///< that follow the one at work
+    std::uint32_t waves_left;  ///< waves that follow the one at work
     FrameStats stats{};
   };
 
@@ -152,8 +152,8 @@ class DeviceRenderer : public Renderer {
   RendererOptions options_;
   BlockStore blocks_;
   Wavefront rays_;
-  std::array<float, 2> value_range_;  ///< of the volume before compression
-  ImageSize size_;                    ///< of the frame at work, or the last
+  std::array<float, 2> value_range_;  ///< values of the volume before compression
+  ImageSize size_;                    ///< size of the frame at work, or of the last
   bool has_picture_ = false;          ///< the hit buffer has the frame's hits so far
   /// Camera and isovalue of the last frame.
   std::optional<std::pair<Camera, float>> last_view_;
@@ -165,7 +165,7 @@ class DeviceRenderer : public Renderer {
   SmoothNormalsWave normals_of_camera_, normals_of_given_;
   Shade shade_;
   std::optional<KeptPicture> kept_;
-  std::optional<RaysWave> given_rays_;  ///< with given rays; as are
+  std::optional<RaysWave> given_rays_;  ///< this and the next two: options_.with_given_rays
   std::optional<Ambient> ambient_;
   std::optional<AmbientRound> ambient_round_;
   Passes passes_;

@@ -143,7 +143,7 @@ std::uint32_t first_cache_slots(std::uint64_t num_blocks, std::uint64_t num_rays
 std::uint32_t grown_cache_slots(const MemoryPlan &plan, std::uint64_t recycled) {
   const std::uint64_t slots = plan.cache_slots;
   if (!plan.can_grow() || recycled <= slots / kSparePart) return plan.cache_slots;
-  // What was freed may have been asked for again and again, and counts as often.
+  // Blocks may have been freed and requested again and again, and count as often.
   const std::uint64_t wanted = std::min((slots + recycled) / 4 * 5, kMostGrowth * slots);
   return static_cast<std::uint32_t>(std::min<std::uint64_t>(wanted, plan.most_slots));
 }

@@ -1,6 +1,6 @@
 #pragma once
-// Every device buffer of a renderer, added up before any of them is made: what a memory budget is
-// held to. How large they are is up to their owners, which say so by sizes().
+// Every device buffer of a renderer, added up before any of them is made, for the memory budget.
+// The owners of the buffers state their lengths by sizes().
 
 #include <algorithm>
 #include <cstdint>
@@ -17,17 +17,17 @@
 
 namespace isowave::core {
 
-/// Where the compressed volume is while frames are drawn.
+/// The place of the compressed volume while frames are drawn.
 enum class StreamPlace {
   kAuto,    ///< on the device if that leaves room for a useful cache, otherwise on the host
   kDevice,  ///< whole
-  kHost     ///< in memory or in its file; blocks are uploaded when they are asked for
+  kHost     ///< in memory or in its file; blocks are uploaded when they are requested
 };
 std::string_view to_string(StreamPlace place);
 /// Throws  Error naming the places there are
 StreamPlace stream_place_from_string(std::string_view name);
 
-/// What the memory of a renderer depends on, besides its volume.
+/// Everything that the memory of a renderer depends on, beside its volume.
 struct MemoryRequest {
   std::uint64_t num_rays = 0;
   PipelinePtr pipeline = rays_pipeline();
@@ -37,39 +37,39 @@ struct MemoryRequest {
       0;                            ///< bytes of one buffer of the compressed volume; 0: no limit
   std::uint32_t window_blocks = 0;  ///< see StreamWindow; 0: by the size of cache and blocks
   bool with_levels = false;         ///< the volume's coarser levels are on the device, too
-  bool with_bounds = false;         ///< and the bounds of their blocks' errors
-  std::uint64_t kept_rays = 0;      ///< of KeptPicture
+  bool with_bounds = false;         ///< the bounds of blocks' errors are on the device, too
+  std::uint64_t kept_rays = 0;      ///< rays of KeptPicture
   bool with_given_rays = false;     ///< rays of any origin, and ambient rays
-  bool sparse_table = false;        ///< the cache's, which rays look up in faster
+  bool sparse_table = false;        ///< the cache's table has room, so that rays look up faster
 };
 
-/// What the lengths of a renderer's buffers depend on, beside its compressed volume: the plan adds
-/// up the sizes() of these, and the renderer constructs from the same.
+/// Limits that the lengths of a renderer's buffers depend on, beside its compressed volume. The
+/// plan adds up the sizes() of these limits, and the renderer makes its buffers from them.
 struct RendererLimits {
   MacrocellBuffers::Limits macrocells{};
   Wavefront::Limits rays{};
   BlockCache::Limits cache{};
-  WaveLimits wave{};            ///< of camera rays
-  std::uint64_t kept_rays = 0;  ///< of KeptPicture; 0: there is none
+  WaveLimits wave{};            ///< camera rays
+  std::uint64_t kept_rays = 0;  ///< rays of KeptPicture; 0: there is none
 };
 
 struct MemoryPlan {
   PipelinePtr pipeline;
   RendererLimits limits{};
-  ocl::BufferSizes buffers;  ///< that live as long as the renderer
+  ocl::BufferSizes buffers;  ///< buffers that live as long as the renderer
   std::uint64_t setup_bytes =
       0;  ///< all that exists while the value ranges are built, scratch included
   std::uint32_t cache_slots = 0;
-  /// The cache may grow to so many, between frames; where it cannot grow: cache_slots.
+  /// The cache may grow to so many, between frames; cache_slots if it cannot grow.
   std::uint32_t most_slots = 0;
   StreamPlace stream = StreamPlace::kDevice;  ///< kDevice or kHost
   std::uint32_t window_blocks = 0;            ///< kHost: see StreamWindow
-  std::uint64_t stream_bytes = 0;             ///< of the buffers for the compressed volume
-  std::string reason;  ///< for the place: "the compressed volume of 10 bytes ..."
+  std::uint64_t stream_bytes = 0;             ///< bytes of the compressed volume's buffers
+  std::string reason;  ///< reason for the place: "the compressed volume of 10 bytes ..."
 
   std::uint64_t total() const { return buffers.bytes(); }
-  /// Bytes: the most that exists as long as the cache does not grow. What a cache takes is given
-  /// back before a larger one is made; so that is also the most that ever existed once it has.
+  /// The most bytes that exist while the cache has this size. A cache is freed before a larger one
+  /// is made, so after the cache has grown this is also the most that ever existed.
   std::uint64_t peak() const { return std::max(total(), setup_bytes); }
   bool can_grow() const { return cache_slots < most_slots; }
 };
@@ -77,34 +77,34 @@ struct MemoryPlan {
 /// The plan of the same renderer once its cache has so many slots.
 MemoryPlan resized(MemoryPlan plan, std::uint32_t cache_slots);
 
-/// Slots with which a cache begins that may grow: for the blocks that a frame needs in most volumes
-/// and as many again, so that the next frame finds free ones. Twice that with rays of any origin:
-/// ambient rays come to blocks that the camera's do not, and a cache that has to grow for them
-/// makes the second frame a cold one.
+/// Initial number of slots of a cache that may grow: twice the blocks that a frame needs in most
+/// volumes, so that the next frame finds free slots. Twice that with rays of any origin: ambient
+/// rays come to blocks that the camera's rays do not, and a cache that grows for them makes the
+/// second frame a cold one.
 std::uint32_t first_cache_slots(std::uint64_t num_blocks, std::uint64_t num_rays,
                                 bool with_given_rays = false);
 
-/// Slots for the next frame, after one that has freed `recycled` slots of blocks that it had asked
-/// for itself; plan.cache_slots where these do.
+/// Slots for the next frame, after one that has freed `recycled` slots of blocks that it had
+/// requested itself; plan.cache_slots if these are enough.
 std::uint32_t grown_cache_slots(const MemoryPlan &plan, std::uint64_t recycled);
 
-/// The plan with so many cache slots and the stream where request.stream says; kAuto: on the
-/// device.
+/// The plan with so many cache slots, and with the stream at the place of request.stream; kAuto: on
+/// the device.
 ///
 /// Throws  Error: the stream does not fit four buffers on the device
 MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &request,
                        std::uint32_t cache_slots);
 
-/// As plan_memory(), but kAuto leaves the stream on the host where the plan would otherwise exceed
-/// the budget, and that takes less.
+/// As plan_memory(), but kAuto leaves the stream on the host if the plan would otherwise exceed the
+/// budget, and the stream on the host takes less.
 ///
 /// budget  [bytes]
 MemoryPlan plan_with_slots(const CompressedVolume &volume, const MemoryRequest &request,
                            std::uint64_t budget, std::uint32_t cache_slots);
 
 /// The plan with the most cache slots whose peak is within a budget, and whose buffers the device
-/// can allocate. kAuto leaves the stream on the host where that gives more slots, and those that
-/// the device would have beside the stream are not enough to be useful.
+/// can allocate. kAuto leaves the stream on the host if that gives more slots, and the device would
+/// not have enough useful ones beside the stream.
 ///
 /// budget     [bytes]
 /// max_slots  the most slots wanted
@@ -112,9 +112,9 @@ MemoryPlan plan_with_slots(const CompressedVolume &volume, const MemoryRequest &
 MemoryPlan plan_within(const ocl::Device &device, const CompressedVolume &volume,
                        const MemoryRequest &request, std::uint64_t budget, std::uint32_t max_slots);
 
-/// A plan that can grow to as many slots as plan_within() gives. It begins with
-/// first_cache_slots(), or, where that keeps it below the decoded volume, with as little as half of
-/// them; with first_slots, where these are not 0.
+/// A plan that can grow to as many slots as plan_within() gives. It begins with first_slots, or if
+/// that is 0 with first_cache_slots(), or with as little as half of these if that keeps it below
+/// the decoded volume.
 ///
 /// budget, max_slots, Throws  as plan_within()
 MemoryPlan plan_to_grow(const ocl::Device &device, const CompressedVolume &volume,

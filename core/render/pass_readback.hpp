@@ -11,7 +11,7 @@
 
 namespace isowave::core {
 
-/// A queue of at most two read-backs in flight. Their memory is pinned: to any other, NVIDIA's
+/// A queue of at most two read-backs in flight. Their memory is pinned: to other memory, NVIDIA's
 /// driver copies by a detour that costs a cold 512^3 frame a fifth of its time (H100).
 class PassReadback {
  public:

@@ -1,5 +1,5 @@
 #pragma once
-// The passes that are on the device, and whose counts are on their way to the host.
+// The passes that are on the device. Their counts are on their way to the host.
 
 #include <cstddef>
 #include <utility>
@@ -10,9 +10,10 @@
 
 namespace isowave::core {
 
-/// At most two passes are in flight, so the host reads one pass behind, and the device never waits
-/// for it. Some of them may be of another wave than the one at work: a pass beyond the last of the
-/// wave before, which found no rays; or the first of the next wave, which has begun early.
+/// The queue of passes. At most two are in flight: the host reads one pass behind, and the device
+/// never waits for the host. A pass in flight may belong to another wave than the one at work: one
+/// pass beyond the last of the wave before, which found no rays, or the first pass of the next
+/// wave, which has begun early.
 class Passes {
  public:
   Passes(ocl::Device &device, Wavefront &rays) : rays_(rays), readback_(device) {}
@@ -30,7 +31,8 @@ class Passes {
     enqueue(next);
     early_ = &next;
   }
-  /// Takes begin_early() back: that pass found rays of the wave at work, and has done nothing.
+  /// Takes begin_early() back. The early pass has done nothing, since it found rays of the wave at
+  /// work.
   void take_back_early() {
     if (std::exchange(early_, nullptr) == nullptr) return;
     readback_.drain();
@@ -44,7 +46,7 @@ class Passes {
   bool has_early() const { return early_ != nullptr; }
   /// Whether no pass of the wave at work is in flight.
   bool are_read() const { return readback_.in_flight() == num_beyond_; }
-  /// Whether another pass may be enqueued. Waits for one beyond the wave before, if that makes
+  /// Whether another pass may be enqueued. Waits for a pass beyond the wave before if that makes
   /// room.
   bool have_room() {
     if (readback_.in_flight() == PassReadback::kMaxInFlight) pop_beyond();

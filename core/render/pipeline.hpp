@@ -1,7 +1,8 @@
 #pragma once
 // Pipelines: ways to trace the camera's rays, with the same finished picture bit for bit.
 //
-//   rays    each ray intersects what it meets, as far as it is cached (core/render/ray_waves.hpp)
+//   rays    each ray intersects the cells that it meets in cached blocks
+//           (core/render/ray_waves.hpp)
 //   blocks  the paper's, to compare with (core/paper/blocks_pipeline.hpp)
 
 #include <cstdint>
@@ -17,14 +18,14 @@ class BlockStore;
 class Wave;
 struct RendererOptions;
 
-/// Packets of eight rays; where they cannot be had (MarchPackets), there are none.
+/// Whether rays march in packets of eight; kOn: if the device can (MarchPackets).
 enum class RayPackets { kAuto, kOn, kOff };
 
-/// Blocks that packets decode when they come to them, instead of waiting for the next pass; never
-/// where the stream stays on the host.
+/// Whether packets decode the blocks that they come to, instead of waiting for the next pass; never
+/// if the stream stays on the host.
 enum class DecodeOnDemand { kAuto, kOn, kOff };
 
-/// What the lengths of a wave's buffers depend on.
+/// Limits that the lengths of a wave's buffers depend on.
 struct WaveLimits {
   std::uint64_t num_rays = 0;
   std::uint32_t num_slots = 0;  ///< of the cache
@@ -38,7 +39,7 @@ class Pipeline {
   virtual std::string_view name() const = 0;
   /// Whether it draws several levels of detail.
   virtual bool has_levels() const = 0;
-  /// Adds what its rays need of a Wavefront.
+  /// Adds the arrays of a Wavefront that its rays need.
   virtual void add_to(Wavefront::Limits &limits) const = 0;
   /// The buffers of its wave beside those of BlockStore and Wavefront.
   virtual ocl::BufferSizes sizes(const WaveLimits &limits) const = 0;
@@ -49,7 +50,7 @@ class Pipeline {
 };
 using PipelinePtr = std::shared_ptr<const Pipeline>;
 
-/// The default: it was faster in nearly all that was measured (bench/h100.md).
+/// The default pipeline, which was faster in nearly all measurements (bench/h100.md).
 PipelinePtr rays_pipeline();
 
 }  // namespace isowave::core

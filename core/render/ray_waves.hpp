@@ -1,5 +1,5 @@
 #pragma once
-// Waves of rays that walk from block to block by themselves, and intersect what is cached:
+// Waves of rays that walk from block to block, and intersect the cells of cached blocks:
 //
 //   start_rays -> march -> request -> [ cache -> decode -> march -> request ]*
 //
@@ -22,8 +22,8 @@
 
 namespace isowave::core {
 
-/// Pipeline `rays`, for one of two kinds of rays: the camera's, or Wavefront::given. The hits of
-/// given rays are in given_hits; a frame has one given ray for each pixel.
+/// Pipeline `rays`, for rays of the camera or for Wavefront::given. Hits of given rays are in
+/// given_hits; a frame has one given ray for each pixel.
 class RaysWave : public Wave {
  public:
   /// blocks, rays: must outlive the wave.
@@ -32,11 +32,11 @@ class RaysWave : public Wave {
            DecodeOnDemand on_demand = DecodeOnDemand::kOff);
 
   void begin() override { start(true); }
-  /// begin(), if given rays belong to the frame at work: blocks that it has used stay in the cache
-  /// as long as others can go.
+  /// begin() for given rays that belong to the frame at work: blocks that the frame has used stay
+  /// in the cache as long as other blocks can go.
   void go_on() { start(false); }
   void enqueue_pass() override;
-  /// Rays look ahead at the end of a pass: those that are left.
+  /// The rays that are left at the end of a pass look ahead.
   void describe(PassStats &stats) const override {
     set_n_spec(stats, stats.counts.next_active_count);
   }
@@ -44,21 +44,21 @@ class RaysWave : public Wave {
  private:
   void start(bool begins_frame);
   const Macrocells &macrocells() const { return blocks_.levels[0].macrocells; }
-  /// Whether the frame at work goes in packets.
+  /// Whether the rays of the frame at work go in packets.
   bool in_packets() const { return march_packets_ && !draws_levels(rays_); }
 
   BlockStore &blocks_;
   Wavefront &rays_;
   StartRays start_rays_;
   March march_;
-  std::optional<MarchPackets> march_packets_;  ///< instead of both
+  std::optional<MarchPackets> march_packets_;  ///< instead of start_rays_ and march_
   RequestAhead request_ahead_;
 };
 
-/// Hits get smooth gradients.
+/// Gives hits smooth gradients.
 class SmoothNormalsWave : public Wave {
  public:
-  /// source: whose hits.
+  /// source: the rays whose hits get gradients.
   SmoothNormalsWave(BlockStore &blocks, Wavefront &rays, SmoothNormals &normals, RaySource source)
       : blocks_(blocks), rays_(rays), normals_(normals), source_(source) {}
 
@@ -75,10 +75,10 @@ class SmoothNormalsWave : public Wave {
   bool begins_ = false;  ///< the next pass is the first
 };
 
-/// A round of ambient rays: one of each hit.
+/// A round of ambient rays: casts one ray from each hit.
 class AmbientRound : public Wave {
  public:
-  /// given: traces RaySource::kGiven.
+  /// given: the wave of RaySource::kGiven.
   AmbientRound(BlockStore &blocks, Wavefront &rays, Ambient &ambient, RaysWave &given)
       : blocks_(blocks), rays_(rays), ambient_(ambient), given_(given) {}
 

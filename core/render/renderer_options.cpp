@@ -16,7 +16,7 @@ RendererOptions checked(RendererOptions options, const CompressedVolume &volume,
   if (options.with_levels) check_has_levels(volume);
   if (options.with_levels && !options.pipeline->has_levels())
     throw Error(
-        "pipeline {} draws one level of detail: leave it to pipeline rays, or allow 0 pixels",
+        "pipeline {} draws only the finest level of detail: take pipeline rays, or allow 0 pixels",
         options.pipeline->name());
   const std::uint64_t layer_ids = std::uint64_t{volume.num_blocks().x} * volume.num_blocks().y;
   std::uint64_t num_ids = 0;  // see make_id_grid()

@@ -1,5 +1,5 @@
 #pragma once
-// What a renderer is made for.
+// The options that a renderer is made with.
 
 #include <cstdint>
 #include <vector>
@@ -21,11 +21,11 @@ struct RendererOptions {
   std::uint32_t first_slots = 0;
   std::uint32_t max_speculation =
       64;  ///< blocks a ray looks ahead at most, 1..64; 1 turns speculation off
-  bool per_ray_speculation = true;  ///< each ray by what it has missed, not all alike
+  bool per_ray_speculation = true;  ///< each ray looks ahead by what it has missed
   Solver solver = kDefaultSolver;   ///< root finder in a cell
-  /// Whether rays march in packets of eight (pipeline `rays`); kAuto: where MarchPackets suits.
+  /// Whether rays march in packets of eight (pipeline `rays`); kAuto: if MarchPackets suits.
   RayPackets packets = RayPackets::kAuto;
-  /// Whether packets decode the blocks that they come to; kAuto: where MarchPackets may.
+  /// Whether packets decode the blocks that they come to; kAuto: if MarchPackets may.
   DecodeOnDemand on_demand = DecodeOnDemand::kAuto;
   std::uint32_t group_size = 64;            ///< work-items per work-group, a power of two in 8..256
   StreamPlace stream = StreamPlace::kAuto;  ///< where the compressed volume is
@@ -49,14 +49,14 @@ struct RendererOptions {
 /// the tables): a cold 720p frame of a 1024^3 volume touches about 400,000 blocks.
 inline constexpr std::uint32_t kAmpleCacheSlots = 1u << 20;
 
-/// The options with their defaults filled in, but for those that the memory plan decides. Throws
-/// Error where they are out of range, or ask for what volume or device do not have.
+/// The options with their defaults filled in, except those that the memory plan decides. Throws
+/// Error if an option is out of range, or if volume or device cannot do what it asks for.
 RendererOptions checked(RendererOptions options, const CompressedVolume &volume,
                         const ocl::Device &device);
 
-/// All memory, before any is taken.
+/// The plan of all memory, before any is taken.
 ///
-/// Throws  Error: it does not suffice
+/// Throws  Error: the memory is not enough
 MemoryPlan make_plan(const ocl::Device &device, const CompressedVolume &volume,
                      const RendererOptions &options);
 

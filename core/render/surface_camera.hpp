@@ -1,5 +1,5 @@
 #pragma once
-// Where isosurfaces may be, by the value ranges that a device computes.
+// The blocks that isosurfaces may be in, by the value ranges that a device computes.
 
 #include <optional>
 #include <span>
@@ -10,8 +10,8 @@
 
 namespace isowave::core {
 
-/// The box around the blocks that isosurfaces may be in, by the blocks' ranges of values; none
-/// where they are in no block. The same for all devices.
+/// The box around the blocks that isosurfaces may be in, by the blocks' ranges of values; none if
+/// they are in no block. The same for all devices.
 ///
 /// macrocells  of the volume's finest level, of which info is the grid
 /// isovalues   one or more

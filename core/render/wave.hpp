@@ -9,7 +9,7 @@
 
 namespace isowave::core {
 
-/// The mean number of blocks that so many rays of a pass were to look ahead at.
+/// Sets the mean number of blocks that so many rays of a pass were to look ahead at.
 inline void set_n_spec(PassStats &stats, uint rays_looking) {
   const uint rays = rays_in_window(stats.counts.window_count, rays_looking);
   if (rays != 0) stats.n_spec = static_cast<double>(stats.counts.ahead_count) / rays;
@@ -19,18 +19,18 @@ class Wave {
  public:
   virtual ~Wave() = default;
 
-  /// Makes the wave's rays, of the frame that the block store has opened.
+  /// Makes the wave's rays for the frame that the block store has opened.
   ///
-  /// Waits  if a frame before was stopped
+  /// Waits  if an earlier frame was stopped
   virtual void begin() = 0;
   /// Enqueues one pass: a chain of launches whose sizes live on the device.
   ///
   /// Throws  Error: as BlockStore::provide()
-  /// Waits   no, but for a stream that stays on the host
+  /// Waits   only if the stream stays on the host
   virtual void enqueue_pass() = 0;
   /// Sum of the wave's passes in the statistics; none: FrameStats::passes lists each.
   virtual LaterPasses *sum_in(FrameStats & /*stats*/) const { return nullptr; }
-  /// Adds to a pass's statistics what depends on how a wave of camera rays is traced.
+  /// Adds to a pass's statistics the counts that depend on the way in which camera rays are traced.
   virtual void describe(PassStats & /*stats*/) const {}
 };
 

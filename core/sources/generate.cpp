@@ -147,7 +147,7 @@ fs::path output_path(const GenerateOptions &options, const fs::path &path) {
   return path;
 }
 
-/// What stands before raw voxels in a NRRD file [teem.sourceforge.net/nrrd/format.html].
+/// The header before raw voxels in a NRRD file [teem.sourceforge.net/nrrd/format.html].
 std::string nrrd_header(const VolumeInfo &info) {
   const std::string_view type = info.type == VoxelType::kFloat32   ? "float"
                                 : info.type == VoxelType::kFloat64 ? "double"

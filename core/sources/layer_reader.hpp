@@ -32,7 +32,7 @@ class TemporaryFile {
   platform::File file_;
 };
 
-/// What several readers of one volume share: the function, and what it has given.
+/// The part that several readers of one volume share: the function, and the layers it has given.
 class LayerSource {
  public:
   /// keep: layers that were read are kept in a temporary file, so that each is asked for once,

@@ -53,7 +53,7 @@ CompressedVolume compress_volume(const OpenReader &open, std::string_view what,
 /// As compress_volume(), but straight into a `.zfp` file, which is then opened: in memory, a few
 /// layers of voxels, and what compress_to_file() says of levels.
 ///
-/// Throws  Error also where the file cannot be written, or its name does not end in .zfp
+/// Throws  Error also if the file cannot be written, or its name does not end in .zfp
 CompressedVolume compress_volume_to_file(const OpenReader &open, std::string_view what,
                                          const Storage &storage, const std::filesystem::path &path);
 

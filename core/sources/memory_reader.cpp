@@ -7,7 +7,7 @@
 
 namespace isowave::core {
 
-// What converts the bytes of files, which are little endian, converts these.
+// Voxels in memory are converted as the bytes of files are, which are little endian.
 static_assert(std::endian::native == std::endian::little);
 
 MemoryReader::MemoryReader(const VolumeInfo &info, std::span<const std::byte> voxels)

@@ -17,7 +17,7 @@ struct NoiseField {
   std::vector<NoiseOctave> octaves{};  ///< group a, then group b
 };
 
-/// None where the field is not of noise.
+/// The noise of a field; none if the field has no noise.
 std::optional<NoiseField> make_noise_field(Field field, const glm::uvec3 &dims, std::uint64_t seed);
 
 /// The field's rows of nx voxels, evaluated by the host.

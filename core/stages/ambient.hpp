@@ -18,7 +18,7 @@ class Ambient {
 
   /// Before the rounds of a frame.
   ///
-  /// Waits  where the number of rays is not that of the frame before
+  /// Waits  if the number of rays differs from that of the frame before
   void begin(const VolumeInfo &info, std::uint32_t num_rays);
 
   /// Counts the rays of round - 1 that met nothing, and makes the rays of a round, unless it is the

@@ -1,6 +1,6 @@
 #pragma once
-// A fixed number of slots for decoded blocks, least recently used ones replaced (Sec. 3.4, 3.5).
-// In: the blocks that a pass's pairs ask for; out: the list of blocks to decode and their slots.
+// A fixed number of slots for decoded blocks; the least recently used are replaced (Sec. 3.4, 3.5).
+// In: the blocks that a pass requests; out: the list of blocks to decode and their slots.
 
 #include "core/stages/wavefront.hpp"
 #include "kernels/block_cache.hpp"
@@ -21,11 +21,11 @@ struct BlockCache {
     std::uint64_t num_macrocells = 0;          ///< of these blocks
     std::uint32_t slot_entries = 2;            ///< of the table, for each slot; a multiple of 2
 
-    /// The most requests that are listed: no more than can be granted; a ray's block asks for at
-    /// most 8, and a block is listed once.
+    /// The most requests that are listed: no more than can be granted. A ray's block requests at
+    /// most 8 blocks, and a block is listed once.
     std::uint32_t max_requests() const;
   };
-  /// For the blocks of `grid`, or, of several levels of detail, of make_id_grid().
+  /// Limits for the blocks of `grid`: of make_id_grid() if there are several levels of detail.
   static Limits limits_for(const BlockGrid &grid, std::uint32_t num_slots, std::uint64_t num_rays,
                            std::uint32_t slot_entries = 2) {
     return {num_slots, num_rays, block_count(grid), core::num_macrocells(grid), slot_entries};
@@ -38,14 +38,14 @@ struct BlockCache {
              bool levels = false);
 
   /// Lists the missing blocks of every pair's dual grid, once each, and stamps the cached ones.
-  /// Pipeline `rays` asks by RequestAhead instead.
+  /// Pipeline `rays` uses RequestAhead instead.
   ///
   /// In     rays.pair_block_ids
   /// Out    request_block_ids; counts.requested_count
   /// Waits  no
   void request(Wavefront &rays);
   /// Frees the slots that were used longest ago, as many as this pass's requests need beyond the
-  /// free ones, but none that the pass uses; the block served first gets what it takes.
+  /// free ones, but none that the pass uses. The block that is served first always gets its slots.
   ///
   /// asked  the counts that hold requested_count
   /// Waits  no
@@ -60,7 +60,7 @@ struct BlockCache {
   /// Counts the cached blocks whose voxels the rays of the pass at work have looked at, for
   /// touched_blocks().
   ///
-  /// in_dual_grids  only what rays read is stamped, as march does, not all that it stands for
+  /// in_dual_grids  a stamp stands for a block's whole dual grid, as march sets it
   /// Waits          no
   void count_touched(Wavefront &rays, bool in_dual_grids);
   /// The last count.
@@ -74,12 +74,11 @@ struct BlockCache {
   /// Forgets every block: the next pass finds the cache as it was made. Does not wait.
   void clear();
 
-  /// Becomes a cache of other limits, without a block or a request. Its buffers are given back
-  /// before others are made, so that never more memory is taken than the larger of both needs.
+  /// Becomes an empty cache with other limits. Its buffers are freed before new ones are made, so
+  /// the peak of memory is that of the larger cache.
   ///
-  /// limits  differ in num_slots alone
-  /// Throws  Error: the device has not so much memory; until another call succeeds, there is no
-  ///         cache
+  /// limits  differ only in num_slots
+  /// Throws  Error: the device has not enough memory; there is no cache until another call succeeds
   /// Waits   yes
   void resize(const Limits &limits);
 

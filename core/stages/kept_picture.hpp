@@ -25,7 +25,7 @@ class KeptPicture {
   void keep(const Wavefront &rays, ImageSize size);
   /// Fills the hit buffer, a picture as large as rays.frame says, from the kept one, enlarged.
   ///
-  /// everywhere  or only where the hit buffer has no hit
+  /// everywhere  false: only for rays without a hit in the hit buffer
   /// Waits       no
   void show(Wavefront &rays, bool everywhere);
 

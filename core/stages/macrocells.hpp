@@ -39,12 +39,12 @@ struct MacrocellBuffers {
 
 class Macrocells {
  public:
-  /// Without the buffers of its MacrocellBuffers.
+  /// Buffers without those of its MacrocellBuffers.
   ///
-  /// num_macrocells  of its level of detail
-  /// num_selections  of its MacrocellBuffers
+  /// num_macrocells  macrocells of its level of detail
+  /// num_selections  selections of its MacrocellBuffers
   static ocl::BufferSizes sizes(std::uint64_t num_macrocells, std::size_t num_selections);
-  /// Bytes that building needs beside what stays.
+  /// Bytes that building needs beside the buffers that stay.
   static std::uint64_t setup_scratch_bytes(const glm::uvec3 &num_blocks);
 
   /// Decodes every block once, beside a sample for the quantile table. Needs 128 bytes of scratch
@@ -59,9 +59,9 @@ class Macrocells {
              std::shared_ptr<MacrocellBuffers> buffers = {}, std::vector<float> thresholds = {},
              std::array<float, 2> *extremes = nullptr);
 
-  /// Makes masks() for an isovalue; nothing to do where they are those in use. Ranges were made of
-  /// voxels of all bit planes, and blocks may since be decoded to other values: by voxel_error and
-  /// by the offsets of `moved`, ranges are taken to be wider.
+  /// Makes masks() for an isovalue, unless they are those in use. Ranges were made of voxels of all
+  /// bit planes, and blocks may since be decoded to other values. So ranges are taken to be wider,
+  /// by voxel_error and by the offsets of `moved`.
   ///
   /// frame        its grid, place and surface.isovalue are used
   /// voxel_error  how far a decoded voxel may be from the one that the ranges were made of
@@ -76,11 +76,11 @@ class Macrocells {
 
   /// The box around the active blocks of the isovalue selected last.
   ///
-  /// Returns  nothing where no block is active
+  /// Returns  nothing if no block is active
   /// Waits    yes
   std::optional<BlockBox> active_blocks(const FrameParams &frame) const;
 
-  /// Takes other masks, of all levels that share the buffers, for select() and all that follows.
+  /// Switches to other masks, at all levels that share the buffers, for select() and later calls.
   void use(std::size_t selection) { buffers_->selection = selection; }
 
   /// [2 * coarse macrocells]: bit x + 4y + 16z of each block in its macrocell, 32 bits a word.
@@ -108,7 +108,7 @@ class Macrocells {
     ocl::Kernel<kernels::macrocell_partials> &kernel;
   };
 
-  /// The values that masks are made of, and the masks' box.
+  /// The values that masks are made from, and the masks' box.
   struct Selection {
     /// Isovalue, voxel_error, uniform and per-block offset of the layout; none: nothing yet.
     std::optional<std::array<double, 4>> of{};

@@ -19,7 +19,7 @@ class MarchPackets {
   /// Whether it has that solver.
   static bool has(Solver solver) { return solver.kind == ISO_SOLVER_BERNSTEIN; }
 
-  /// Whether threads of that device may decode blocks on demand: where memory is ordered as
+  /// Whether threads of that device may decode blocks on demand: if it orders memory as
   /// kernels_cl/device/on_demand.h says.
   static bool may_decode(const ocl::DeviceInfo &device);
 

@@ -19,13 +19,13 @@ class Shade {
   /// Launches the kernel without a pixel to shade, see Device::Compiling.
   void compile(Wavefront &rays);
 
-  /// Shades rays.hits, as open as rays.open_counts says.
+  /// Shades rays.hits, with the ambient light that rays.open_counts lets through.
   ///
   /// samples  rays a pixel along each axis
   /// Returns  RGB
   /// Waits    yes
   Image8 operator()(const ShadeParams &params, Wavefront &rays, std::uint32_t samples = 1);
-  /// The same as the kernel has it: RGBA, red in bits 0..7, A 0 where no ray of a pixel hits.
+  /// The same as the kernel writes it: RGBA, red in bits 0..7, A 0 if no ray of a pixel hits.
   std::vector<uint> packed(const ShadeParams &params, Wavefront &rays, std::uint32_t samples);
 
  private:

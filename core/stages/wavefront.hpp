@@ -28,14 +28,14 @@ struct Wavefront {
     bool with_pairs = true;      ///< pipeline `blocks` needs the arrays of ray-block pairs
     std::size_t num_levels = 1;  ///< of detail
     bool with_given = false;     ///< there may be rays of RaySource::kGiven
-    bool with_walks = true;      ///< rays walk from block to block: not where triangles are drawn
+    bool with_walks = true;      ///< rays walk from block to block: false if triangles are drawn
     bool scanned_pairs = false;  ///< there may be frames with Schedule::scanned_pairs
   };
   static ocl::BufferSizes sizes(const Limits &limits);
 
   Wavefront(ocl::Device &device, const Limits &limits);
 
-  /// As before the first pass of all.
+  /// Sets all counts as before the first pass of all.
   ///
   /// Waits  yes
   void reset_counts() {
@@ -56,14 +56,15 @@ struct Wavefront {
     counts.write({&last, 1});
   }
 
-  /// The counts and the rays left by one pass go to the next (pipeline `rays`, smooth normals).
+  /// Hands the counts and the rays that one pass has left to the next (pipeline `rays`, smooth
+  /// normals).
   void open_pass() {
     std::swap(previous_counts, counts);
     std::swap(counts, next_counts);
     std::swap(active_ray_ids, next_active_ray_ids);
   }
 
-  /// Takes open_pass() back, of a pass that has touched nothing of these.
+  /// Takes open_pass() back, for a pass that has touched none of these arrays.
   void unopen_pass() {
     std::swap(active_ray_ids, next_active_ray_ids);
     std::swap(counts, next_counts);
@@ -82,20 +83,20 @@ struct Wavefront {
       level_frames;  ///< [num_level_frames] of all that draw (pipeline `rays` with several)
   std::uint32_t num_level_frames = 1;
   CountsBuffer counts;                ///< [1] of the pass at work
-  CountsBuffer previous_counts;       ///< [1] of the pass before, where open_pass() is called
+  CountsBuffer previous_counts;       ///< [1] of the pass before, if open_pass() is called
   CountsBuffer next_counts;           ///< [1] of the next such pass, opened by this one
   ocl::Buffer<HitRecord> hits;        ///< [R] by pixel: the picture so far
   ocl::Buffer<GivenRay> given;        ///< [R] of any origin; empty unless there may be some
-  ocl::Buffer<HitRecord> given_hits;  ///< [R] what these hit
+  ocl::Buffer<HitRecord> given_hits;  ///< [R] hits of given rays
   ocl::Buffer<uchar> open_counts;   ///< [R] by pixel: ambient rays of its hit that met nothing ...
   std::uint32_t num_ambient = 0;    ///< ... of so many; 0: the frame has none
   ocl::Buffer<uint> ray_block_ids;  ///< [R] by pixel: where a ray goes on from: RayStand (R_BID)
   ocl::Buffer<uint>
       active_ray_ids;  ///< [active_count] rays at work: RayEntry of ray_state.h (R_ID)
   ocl::Buffer<uint> next_active_ray_ids;  ///< [next_active_count]
-  ocl::Buffer<uint> mask;                 ///< [R] scratch: what the next compaction keeps
-  ocl::Buffer<uint> pair_block_ids;       ///< [pair_slot_count] blocks asked for, in ray order
-  ocl::Buffer<PairHit> pair_hits;         ///< [pair_slot_count] what intersection found
+  ocl::Buffer<uint> mask;                 ///< [R] scratch: rays that the next compaction keeps
+  ocl::Buffer<uint> pair_block_ids;       ///< [pair_slot_count] requested blocks, in ray order
+  ocl::Buffer<PairHit> pair_hits;         ///< [pair_slot_count] results of intersection
   ocl::Buffer<uint> pair_begins;  ///< [window_count + 1], with scanned pairs: see ray_pairs.h
   ocl::Buffer<uint> pair_rays;    ///< [pair_slot_count], with scanned pairs
   ocl::Buffer<uint>

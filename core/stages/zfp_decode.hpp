@@ -41,7 +41,7 @@ class ZfpDecode {
   /// In      block_ids, slots [counts.decoded_count]
   /// Out     values [64 * slots], x + 4y + 16z within a slot; inside [slots], a bit for each voxel
   /// Throws  Error: the stream stays on the host, and the volume's file has become shorter
-  /// Waits   where the stream stays on the host, for all that is enqueued
+  /// Waits   if the stream stays on the host, for all that is enqueued
   void operator()(const DeviceStream &stream, const FrameParams &frame, const CountsBuffer &counts,
                   const ocl::Buffer<uint> &block_ids, const ocl::Buffer<uint> &slots,
                   ocl::Buffer<float> &values, ocl::Buffer<ulong> &inside) {
@@ -66,7 +66,7 @@ class ZfpDecode {
   ocl::Defines stream_defines_;
   ocl::Range range_;
   std::optional<ocl::Buffer<uint>>
-      places_;  ///< of this level's requests, where several levels' streams are in windows
+      places_;  ///< of this level's requests, if several levels' streams are in windows
   ocl::Kernel<kernels::zfp_decode> kernel_;
 };
 

@@ -54,7 +54,7 @@ class ZfpEncode {
 /// works on one, the caller prepares the next.
 class LayerEncoder {
  public:
-  /// Voxels on the device at a time, or a row of blocks where that is more.
+  /// Voxels on the device at a time, or a row of blocks if a row has more.
   static constexpr std::uint64_t kPieceVoxels = 1ull << 22;
   /// Takes the payload in order.
   using Sink = std::function<void(std::span<const std::byte>)>;

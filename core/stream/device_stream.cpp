@@ -42,8 +42,8 @@ void write_words(const CompressedVolume &volume, std::uint64_t first, ocl::Buffe
   }
 }
 
-/// Where blocks begin, if they have lengths of their own, behind it the bounds of their errors, and
-/// the table of voxels without data; nothing of all: no buffer.
+/// The buffer of the places of blocks, if they have lengths of their own, then the bounds of their
+/// errors, then the table of voxels without data; no buffer if there is none of them.
 ocl::BufferSizes index_sizes(std::span<const std::uint32_t> index,
                              std::span<const std::uint8_t> bounds,
                              std::span<const std::uint32_t> no_data) {
@@ -90,7 +90,7 @@ ocl::BufferSizes DeviceStream::sizes(const CompressedVolume &volume, const Strea
       index_sizes(index_of(volume), bounds_of(volume, with_bounds), volume.no_data.table()));
 }
 
-/// A window brings where its blocks begin.
+/// A window brings the places of its blocks itself.
 ocl::BufferSizes DeviceStream::sizes(const CompressedVolume &volume, OnHost host,
                                      bool with_bounds) {
   return StreamWindow::sizes(volume, host.window_blocks)

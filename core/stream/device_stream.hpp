@@ -28,8 +28,8 @@ struct StreamSplit {
 /// largest_part: bytes.
 StreamSplit split_stream(const CompressedVolume &volume, std::uint64_t largest_part);
 
-/// On the device, the table of voxels without data (kernels_cl/portable/no_data.h); the default:
-/// all voxels have data.
+/// The table of voxels without data (kernels_cl/portable/no_data.h) on the device. The default: all
+/// voxels have data.
 struct NoDataOnDevice {
   const ocl::Buffer<uint> *words = nullptr;
   uint begin = ISO_INVALID_ID;  ///< the table's first word
@@ -48,18 +48,20 @@ struct OnHost {
 
 class DeviceStream {
  public:
-  /// Buffers of a whole stream in such parts, or of one behind a window. The table of voxels
-  /// without data is counted; with_bounds: the bounds of blocks, too.
+  /// Buffers of a whole stream in such parts, or of a stream behind a window, with the table of
+  /// voxels without data. with_bounds: also the bounds of blocks.
   static ocl::BufferSizes sizes(const CompressedVolume &volume, const StreamSplit &split,
                                 bool with_bounds);
   static ocl::BufferSizes sizes(const CompressedVolume &volume, OnHost host, bool with_bounds);
 
-  /// Uploads the whole volume and waits. with_bounds: and those of its blocks, for
-  /// layout.bound_unit. largest_part: bytes of a buffer at most; 0: what the device allows. Throws
-  /// Error when four such buffers do not hold it.
+  /// Uploads the whole volume and waits.
+  ///
+  /// largest_part  most bytes of a buffer; 0: what the device allows
+  /// with_bounds   also uploads the bounds of blocks, for layout.bound_unit
+  /// Throws        Error: four such buffers do not hold the volume
   DeviceStream(ocl::Device &device, const CompressedVolume &volume, std::uint64_t largest_part = 0,
                bool with_bounds = false);
-  /// Leaves the volume on the host, where it must outlive the stream.
+  /// Leaves the volume on the host. The volume must outlive the stream.
   DeviceStream(ocl::Device &device, const CompressedVolume &volume, OnHost host,
                bool with_bounds = false);
 
@@ -67,11 +69,11 @@ class DeviceStream {
   ocl::Defines defines() const;
   /// Do these defines stand for a stream on the host?
   static bool is_window(const ocl::Defines &defines);
-  /// Buffer i of 0..3 of a whole stream; where there are fewer, the first.
+  /// Buffer i of 0..3 of a whole stream; the first if there are fewer.
   const ocl::Buffer<uint> &part(std::size_t i) const { return parts[i < parts.size() ? i : 0]; }
-  /// Where the blocks of a whole stream begin (block_index.h), the bounds of a level of detail, and
-  /// the table of voxels without data; where there is nothing to look up, any buffer. words: of the
-  /// window, where there is one.
+  /// The places of a whole stream's blocks (block_index.h), the bounds of a level of detail, and
+  /// the table of voxels without data; any buffer if there is none of them. words: the window's, if
+  /// there is a window.
   const ocl::Buffer<uint> &index() const { return block_index ? *block_index : parts[0]; }
   const ocl::Buffer<uint> &index(const ocl::Buffer<uint> &words) const {
     return block_index ? *block_index : words;
@@ -80,11 +82,11 @@ class DeviceStream {
     return {layout.no_data_begin != ISO_INVALID_ID ? &*block_index : nullptr, layout.no_data_begin};
   }
 
-  std::vector<ocl::Buffer<uint>> parts;  ///< 1..4; none where the volume stays on the host
-  /// Where blocks begin, their bounds, and the table of voxels without data; empty if the volume
+  std::vector<ocl::Buffer<uint>> parts;  ///< 1..4; none if the volume stays on the host
+  /// The places of blocks, their bounds, and the table of voxels without data; empty if the volume
   /// has none of the three.
   std::optional<ocl::Buffer<uint>> block_index;
-  std::unique_ptr<StreamWindow> window;  ///< where the volume stays on the host
+  std::unique_ptr<StreamWindow> window;  ///< if the volume stays on the host
   StreamLayout layout;
 
  private:

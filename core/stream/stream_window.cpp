@@ -41,7 +41,7 @@ cl::Event mark(ocl::Device &device) {
   }
 }
 
-/// What is enqueued on the device's main queue from now on begins after the event.
+/// Makes commands that are enqueued on the device's main queue from now on wait for the event.
 void hold_back(ocl::Device &device, const cl::Event &event) {
   try {
     const std::vector<cl::Event> events{event};

@@ -19,9 +19,10 @@ namespace isowave::core {
 
 class StreamWindow {
  public:
-  /// window_blocks: what one half holds, at least 1. `volume` must outlive the window. A payload in
-  /// a file is copied to host memory if it is at most max_copy bytes: else each block is read when
-  /// it is asked for, which costs a system call.
+  /// volume         must outlive the window
+  /// window_blocks  blocks that one half holds, at least 1
+  /// max_copy       most bytes of a payload in a file that is copied to host memory; each block of
+  ///                a larger one is read when it is requested, which costs a system call
   StreamWindow(ocl::Device &device, const CompressedVolume &volume, std::uint32_t window_blocks,
                std::uint64_t max_copy = default_max_copy());
   /// A quarter of the host's memory.
@@ -29,25 +30,25 @@ class StreamWindow {
   StreamWindow(const StreamWindow &) = delete;
   StreamWindow &operator=(const StreamWindow &) = delete;
 
-  /// Words of one block in the window, where each begins with a whole word: of every block at a
-  /// fixed rate, otherwise of most.
+  /// Words of a block in the window, where each block begins with a whole word: of every block at a
+  /// fixed rate, otherwise of most blocks.
   static std::uint64_t words_per_block(const CompressedVolume &volume);
   /// Buffers of both halves and their staging memory. Each half holds the places where blocks begin
   /// and end (kernels_cl/device/block_stream.h) unless all have one length, then the blocks, then
   /// two words that decoders read past their block.
   static ocl::BufferSizes sizes(const CompressedVolume &volume, std::uint32_t window_blocks);
 
-  /// Enqueues launches that read blocks block_ids[first .. first + count), one after the other in
-  /// `words`.
+  /// A function that enqueues launches which read blocks block_ids[first .. first + count), one
+  /// after the other in `words`.
   using Use =
       std::function<void(const ocl::Buffer<uint> &words, std::uint32_t first, std::uint32_t count)>;
   /// Brings blocks to the device, as many at a time as fit, and calls `use` for each of these runs,
-  /// in order. Waits for the uploads of all runs but the last two; the rest is asynchronous. Throws
-  /// Error when a file that blocks are read from has become shorter.
+  /// in order. Waits for the uploads of all runs except the last two. Throws Error if the file that
+  /// blocks are read from has become shorter.
   void bring(std::span<const uint> block_ids, const Use &use);
 
-  /// The first counts.decoded_count of block_ids. Waits for all that is enqueued before. Valid
-  /// until the next call, for the caller to change.
+  /// Waits for all that was enqueued before, and returns the first counts.decoded_count of
+  /// block_ids. The caller may change them; they are valid until the next call.
   std::span<uint> read_granted(const ocl::Buffer<PassCounts> &counts,
                                const ocl::Buffer<uint> &block_ids);
 
@@ -75,7 +76,7 @@ class StreamWindow {
   ocl::Device &device_;
   const CompressedVolume &volume_;
   std::uint32_t window_blocks_;
-  std::vector<std::uint32_t> copy_;  ///< of the payload, as CompressedVolume::words; or empty
+  std::vector<std::uint32_t> copy_;  ///< the payload, as CompressedVolume::words; or empty
   std::array<Half, 2> halves_;
   std::size_t next_half_ = 0;
   std::uint64_t uploaded_blocks_ = 0, uploaded_bytes_ = 0;

@@ -1,11 +1,10 @@
 #pragma once
 // Level of detail: which of a volume's levels draws which part of the rays.
 //
-// A level is fine enough from where its voxels are at most so many pixels apart. That depends on
-// the distance from the eye alone, so a frame is drawn in bands, from spherical border to border:
-// the finest level nearest. A ray that crosses a border goes on at the next level; where the two
-// levels have it on different sides of the isosurface, the border is its hit, so that no ray slips
-// between them.
+// A level is fine enough from the distance on at which its voxels are at most so many pixels apart.
+// So a frame is drawn in bands, from spherical border to border, the finest level nearest. A ray
+// that crosses a border goes on at the next level. If the two levels have the ray on different
+// sides of the isosurface, the border is its hit, so that no ray slips between them.
 
 #include <cmath>
 #include <span>
@@ -28,14 +27,14 @@ namespace isowave::core {
 std::vector<FrameParams> make_level_frames(std::span<const VolumeInfo> levels, const Camera &camera,
                                            ImageSize size, float isovalue, double voxel_pixels);
 
-/// How far decoded voxels of a level may be off where those of the finest may be by voxel_error:
-/// twice as far as of the level before, since it is drawn from twice the distance on. So what
-/// planes leave out is as many pixels wide at each border.
+/// How far decoded voxels of a level may be off if those of the finest may be off by voxel_error:
+/// twice as far as in the level before, since a level is drawn from twice the distance on. So
+/// errors of left out planes are as many pixels wide at each border.
 inline double voxel_error_of(double voxel_error, std::size_t level) {
   return std::ldexp(voxel_error, static_cast<int>(level));
 }
 
-/// The volume and, where levels are wanted, its coarser levels.
+/// The volume and, if levels are wanted, its coarser levels.
 std::vector<const CompressedVolume *> levels_of(const CompressedVolume &volume, bool with_levels);
 std::vector<VolumeInfo> level_infos(const CompressedVolume &volume, bool with_levels);
 

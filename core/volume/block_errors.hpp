@@ -1,5 +1,5 @@
 #pragma once
-// What compression has done to each block.
+// The errors that compression has made in each block.
 
 #include <algorithm>
 #include <array>
@@ -60,8 +60,8 @@ class BlockErrors {
   /// keep: bound_by_place() of each block, in 4 bytes; else only the largest of all.
   explicit BlockErrors(bool keep) : keep_(keep) {}
 
-  /// What the next blocks had lost before they were compressed (Chunk::lost); to be called before
-  /// their end().
+  /// Adds the errors that the next blocks had before they were compressed (Chunk::lost). Call it
+  /// before their end().
   void add_lost(std::span<const float> lost) {
     lost_.insert(lost_.end(), lost.begin(), lost.end());
   }

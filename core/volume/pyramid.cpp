@@ -37,7 +37,7 @@ float low_pass(std::array<float, kNumTaps> v) {
   return std::clamp(inner - (0.0625f * v[0] + 0.0625f * v[4]), least, largest);
 }
 
-/// Where coarse voxel k of an axis of n fine ones takes its values.
+/// The voxels that coarse voxel k of an axis of n fine ones takes its values from.
 std::array<std::uint32_t, kNumTaps> taps(std::uint32_t k, std::uint32_t n) {
   std::array<std::uint32_t, kNumTaps> at{};
   for (std::uint32_t i = 0; i < kNumTaps; ++i)

@@ -2,16 +2,16 @@
 // Levels of detail: a pyramid of grids, each with half the voxels of the one before along each
 // axis.
 //
-// Voxel k of a level lies where voxel 2k of the level before does, so planes of a coarse grid are
-// planes of the fine one, and a ray crosses both at the same t, bit for bit. Its value is a mean of
-// five along each axis, by -1/16, 1/4, 5/8, 1/4, -1/16, held to the least and the largest of them.
-// So a field that bends evenly keeps its values there, and surfaces their place, where positive
-// weights would shrink them. Behind the last voxel lie copies of it, and a coarse grid may end up
-// to a voxel of its own behind the fine one.
+// Voxel k of a level lies at voxel 2k of the level before, so planes of a coarse grid are planes of
+// the fine one, and a ray crosses both at the same t, bit for bit. The value of voxel k is a mean
+// of five voxels along each axis, by -1/16, 1/4, 5/8, 1/4, -1/16, clamped to their range. So a
+// field that bends evenly keeps its values, and surfaces keep their place; positive weights would
+// shrink them. Behind the last voxel lie copies of it, and a coarse grid may end up to one of its
+// voxels behind the fine one.
 //
 // A voxel without data is NaN here. Axis by axis, a coarse voxel has data if the fine voxel at its
-// place has, or lies between two that have: it is then taken to be their mean. Behind the last
-// voxel with data lie copies of it, as behind the last of all (core/zfp/README.md).
+// place has data, or lies between two with data: the fine voxel is then taken to be their mean.
+// Behind the last voxel with data lie copies of it (core/zfp/README.md).
 
 #include <cstdint>
 #include <deque>

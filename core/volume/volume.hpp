@@ -65,7 +65,7 @@ auto with_voxel_type(VoxelType type, const Use &use) {
   return use(double{});
 }
 
-/// Where a brick lies in the volume that it is a part of; the defaults: it is the whole.
+/// Place of a brick in the volume that it is a part of; the defaults: it is the whole.
 struct BrickOf {
   glm::uvec3 first_voxel{0};  ///< of the brick, in the whole volume; multiples of 4
   /// Layers of 4^3 blocks before and behind, along each axis, that belong to other bricks.
@@ -101,7 +101,7 @@ class VolumeReader {
  public:
   virtual ~VolumeReader() = default;
   const VolumeInfo &info() const { return info_; }
-  /// What a user should know of how the file's header was understood: a line each.
+  /// Lines for users that say how the file's header was understood.
   const std::vector<std::string> &notices() const { return notices_; }
 
   /// Reads voxel layers [z_begin, z_begin + num_layers) to `out` [num_layers * ny * nx]. Calls must

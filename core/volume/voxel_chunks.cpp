@@ -39,7 +39,7 @@ class Untouched {
   std::span<Value> values_;  ///< all of it
 };
 
-/// What is learnt of a run of voxels.
+/// Facts about a run of voxels.
 struct Findings {
   std::uint64_t bad_count = 0, first_bad = ~std::uint64_t(0);  ///< infinite; linear voxel index
   std::uint64_t no_data_count = 0;
@@ -219,9 +219,9 @@ struct KnownVoxels {
   }
 };
 
-/// What a smooth field would have at an unknown voxel: the mean, over the axes, of what continues
-/// the three other voxels of its row as a parabola; else of what lies between two neighbours; else
-/// of what two on one side lead to; else of single neighbours.
+/// The value that a smooth field would have at an unknown voxel: the mean, over the axes, of the
+/// parabola through the three other voxels of its row; else of the middle of two neighbours; else
+/// of the line through two voxels on one side; else of single neighbours.
 std::optional<double> smooth_guess(const KnownVoxels &block, const std::array<int, 3> &place) {
   std::array<double, 4> sums{};
   std::array<int, 4> counts{};

@@ -1,6 +1,6 @@
 #pragma once
-// A volume on its way to a compressor: read chunk by chunk, one ahead of the one at work, every
-// voxel checked.
+// A volume on its way to a compressor: it is read chunk by chunk, one chunk ahead, and every voxel
+// is checked.
 
 #include <cstdint>
 #include <functional>
@@ -28,7 +28,8 @@ inline constexpr std::uint32_t kBlockEdge = 4;  ///< voxels
 /// Opens a reader at the volume's front, each time it is called.
 using OpenReader = std::function<std::unique_ptr<VolumeReader>()>;
 
-/// A volume that processes read together: of layers that several have, one counts what is found.
+/// A part of a volume that processes read together. If several processes have a layer, one counts
+/// it.
 struct VolumePart {
   Team *team = nullptr;
   VolumeInfo whole{};
@@ -46,12 +47,12 @@ struct InputOptions {
   std::optional<double> no_data{};
   Progress progress{};
   std::uint32_t num_threads = 0;  ///< 0: one per processor; the result is the same for any number
-  /// The reader gives this part. What is found, and refused, is the whole's, at all processes.
+  /// The part that the reader gives. All processes find, and refuse, the same as in the whole.
   const VolumePart *part = nullptr;
   bool keeps_tiny = false;  ///< voxels below kMinMagnitude are coded as they are
 };
 
-/// A few voxel layers, whole layers of blocks but at the volume's end.
+/// A few voxel layers: whole layers of blocks, except at the volume's end.
 struct Chunk {
   std::uint32_t z = 0, num_layers = 0;
   std::span<float> voxels{};   ///< [num_layers][ny][nx]
@@ -81,7 +82,7 @@ struct BlockRow {
   const std::uint64_t *no_data = nullptr;  ///< of its blocks: Chunk::no_data
 };
 
-/// What becomes of the voxels.
+/// Takes the checked voxels, chunk by chunk.
 class ChunkCoder {
  public:
   virtual ~ChunkCoder() = default;

@@ -15,18 +15,17 @@ class BlockDecoder {
  public:
   explicit BlockDecoder(const CompressedVolume &volume) : volume_(volume) {}
 
-  /// Makes blocks [first, first + count) ready: reads them at once, where they are in a file.
+  /// Makes blocks [first, first + count) ready: reads them at once, if they are in a file.
   ///
   /// Throws  Error: the file is shorter than it was, or cannot be read
   void load(std::uint64_t first, std::uint64_t count);
-  /// The voxels x + 4 y + 16 z of a block that is ready, padding included; NaN of those without
-  /// data.
+  /// The voxels x + 4 y + 16 z of a block that is ready, with padding; voxels without data are NaN.
   void decode(std::uint64_t id, std::span<float, ISO_BLOCK_VOXELS> voxels) const;
 
  private:
   const CompressedVolume &volume_;
-  std::vector<std::uint32_t> read_{};  ///< from a file
-  std::uint64_t first_bit_ = 0;        ///< of the payload, where read_ begins
+  std::vector<std::uint32_t> read_{};  ///< words that were read from a file
+  std::uint64_t first_bit_ = 0;        ///< bit of the payload at which read_ begins
 };
 
 }  // namespace isowave::core

@@ -23,10 +23,10 @@ namespace isowave::core {
 
 namespace {
 
-/// What a rank's slab of a level becomes.
+/// A rank's slab of a level after compression.
 struct CodedSlab {
   CompressedVolume volume;                 ///< of the layers worked on
-  std::vector<float> errors;               ///< of its own blocks, where they are kept
+  std::vector<float> errors;               ///< of its own blocks, if they are kept
   std::optional<SectionWriter> payload{};  ///< its own, at a fixed rate
   std::uint64_t payload_bytes = 0;         ///< that were coded, its own or not
 };
@@ -38,7 +38,7 @@ struct LevelData {
   std::vector<float> decoded;  ///< of its own blocks
 };
 
-/// That many layers of voxels of a level, not coded yet.
+/// So many layers of voxels of a level, not compressed yet.
 CompressedVolume slab_of(const CompressedVolume &level, std::uint32_t layers) {
   CompressedVolume slab;
   slab.info = level.info;

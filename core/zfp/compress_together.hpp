@@ -9,13 +9,13 @@
 
 namespace isowave::core {
 
-/// Compresses the volume. In memory: a few layers of voxels; where an error is bounded, what the
-/// slab is compressed to; with levels, the slab of the second one as float32, and what
-/// compress_to_file() says of them, for the slab.
+/// Compresses the volume. In memory: a few layers of voxels; if an error is bounded, the compressed
+/// slab; with levels, the slab of the second level as float32, and the memory of compress_to_file()
+/// for the slab's levels.
 ///
 /// open    gives the whole volume's reader
-/// options input.part is not looked at
-/// Returns what was written, but for words, index and bounds, which stay empty
+/// options input.part is not used
+/// Returns the volume that was written, with empty words, index and bounds
 /// Throws  Error at all processes, as compress_to_file()
 CompressedVolume compress_together(Team &team, const OpenReader &open,
                                    const CompressOptions &options, SharedFile &file);

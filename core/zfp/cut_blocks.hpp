@@ -15,14 +15,14 @@ namespace isowave::core {
 /// Lays rows of blocks along x end to end, those of a box in their order: y, then z.
 class BlockCutter {
  public:
-  /// whole  where the payload is read from; its index may be missing
+  /// whole  the volume that the payload is read from; its index may be missing
   /// box    not empty, within the whole
   BlockCutter(const CompressedVolume &whole, const BlockBox &box);
   /// first_bit  of the row in the whole's payload
   /// lengths    of its blocks [bits]
   void add_row(std::uint64_t first_bit, std::span<const std::uint32_t> lengths);
-  /// After the last row: the volume, in words. Its dims and brick.first_voxel are the box's; all
-  /// else that is said of voxels is the whole's.
+  /// After the last row: the volume, in words. Its dims and brick.first_voxel are the box's; its
+  /// other properties are the whole's.
   CompressedVolume finish();
 
  private:
@@ -52,14 +52,15 @@ class BoundsCutter {
   BlockBounds cut_;
 };
 
-/// The blocks of a box with their bounds, of a volume wherever it is, without levels of detail.
+/// The blocks of a box with their bounds, from a volume in memory or in a file, without levels of
+/// detail.
 ///
 /// Throws  Error: a file is shorter than it was
 CompressedVolume cut_blocks(const CompressedVolume &whole, const BlockBox &box);
 
-/// The same of a `.zfp` file, a box of each of its first levels of detail. Little else is read:
-/// headers, trailers, the lengths of blocks and, with_bounds, the bounds of all. So the checksum of
-/// the payload is not looked at.
+/// The same from a `.zfp` file: a box from each of its first levels of detail. Beside the blocks it
+/// reads headers, trailers, the lengths of blocks and, with_bounds, all bounds. So the checksum of
+/// the payload is not checked.
 ///
 /// Throws  Error as read_zfp_file_info(); a damaged index, damaged bounds; a file of zfp's own tool
 ///         whose blocks have lengths of their own, since it does not say where they begin

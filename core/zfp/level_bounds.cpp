@@ -23,7 +23,7 @@ Reach reach_of(std::uint32_t block, std::uint32_t fine_dim) {
   return {first - std::min(first, 2u), std::min(first + 9, fine_dim)};
 }
 
-/// What float32 may lose between voxels and the field at a hit, in roundings: of values, when they
+/// Roundings by which float32 may lose between voxels and the field at a hit: of values, when they
 /// are raised or lowered; of their differences from the isovalue, when these are taken (1), where
 /// lerps of three axes (6), positions on two (2), sums and thirds (4) make a cubic of them
 /// (segment_cubic()), and where three more (6) evaluate that. 19, and some for what is left out
@@ -204,8 +204,7 @@ ValueOffset value_offset(const LevelError &error, FieldBound bound, double plane
   if (!error.uniform) {
     throw Error(
         "the volume's error is not known, or not that of its levels of detail: convert it again, "
-        "with "
-        "--levels and without "
+        "with --levels and without "
         "--no-verify");
   }
   const double beyond =

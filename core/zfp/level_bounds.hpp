@@ -24,7 +24,7 @@ namespace isowave::core {
 /// fine cell their difference is trilinear, too, and largest at a voxel. The bound of a coarse
 /// block is the largest difference in all cells that touch a voxel of it. A field that has these
 /// bounds at the coarse voxels, and is trilinear between them, is nowhere below the difference.
-/// Where either has no data, there is no difference.
+/// If either has no data at a voxel, there is no difference.
 class LevelBounds {
  public:
   LevelBounds(const glm::uvec3 &fine_dims, const glm::uvec3 &coarse_dims,
@@ -37,8 +37,10 @@ class LevelBounds {
   struct Off {
     std::vector<float> made, decoded;
   };
-  /// After all layers. finer: how far the fine level's blocks are from the source, as they were
-  /// made; of the finest, what their voxels lost (Chunk::lost); none where that is nothing.
+  /// The errors of all blocks, after all layers.
+  ///
+  /// finer  how far the fine level's blocks are from the source, as they were made; for the finest
+  ///        level, what its voxels lost (Chunk::lost); empty if that is nothing
   Off finish(std::span<const float> finer) const;
 
  private:
@@ -74,7 +76,7 @@ enum class FieldBound { kNone, kLower, kUpper };
 inline constexpr std::size_t kNumFieldBounds = 3;
 
 /// Largest error of a volume's voxels, measured or, at fixed accuracy, as zfp promises; nothing
-/// where that is not known.
+/// if that is not known.
 std::optional<double> known_voxel_error(const CompressedVolume &volume);
 
 /// How far a level's decoded values may be off.
@@ -89,25 +91,25 @@ struct LevelError {
 /// The largest bound of the whole level, even if `bounds` are a brick's.
 float largest_bound(const BlockBounds &bounds);
 
-/// How far decoded values may be from those of all bit planes where with_fewer_planes(bound,
+/// How far decoded values may be from those of all bit planes if with_fewer_planes(bound,
 /// voxel_error) leaves planes out.
 double plane_error(const BlockPrecision &bound, double voxel_error);
 
-/// What is added to a level's decoded values for a field bound: uniform + unit * the block's bound,
-/// or the voxel's share of it (StreamLayout).
+/// Offset of a level's decoded values for a field bound: uniform + unit * the block's bound, or the
+/// voxel's share of it (StreamLayout).
 struct ValueOffset {
   float uniform = 0, unit = 0;
 };
-/// Throws Error where the level's error or the range of values is not known.
+/// Throws Error if the level's error or the range of values is not known.
 ///
 /// plane_error  how far values of fewer bit planes are from those of all
-/// value_range  of the volume before compression: what sums of such values lose in float32 is part
-/// of the offset
+/// value_range  of the volume before compression; what sums of such values lose in float32 is part
+///              of the offset
 ValueOffset value_offset(const LevelError &error, FieldBound bound, double plane_error,
                          const std::array<float, 2> &value_range);
 
-/// What is added to the value of voxel x + 4 y + 16 z of a block, in the order in which
-/// decode_block() in kernels_cl/device/block_stream.h adds it up.
+/// Offset of the value of voxel x + 4 y + 16 z of a block, added up in the order of decode_block()
+/// in kernels_cl/device/block_stream.h.
 float offset_of_voxel(const ValueOffset &offset, const BlockBounds &bounds, std::size_t block,
                       std::uint32_t voxel);
 

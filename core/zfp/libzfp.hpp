@@ -11,7 +11,7 @@
 
 namespace isowave::core {
 
-/// What libzfp has made; it makes nothing without memory.
+/// Returns an object that libzfp has made; throws std::bad_alloc if libzfp had no memory for it.
 template <class T>
 T *or_bad_alloc(T *made) {
   if (made == nullptr) throw std::bad_alloc();
@@ -28,8 +28,8 @@ using ZfpHeader = std::array<std::uint32_t, kZfpHeaderWords>;
 ZfpHeader make_zfp_header(const glm::uvec3 &dims, std::uint32_t bits_per_block,
                           std::int32_t min_exponent = ZFP_MIN_EXP);
 
-/// A stream at a fixed number of bits per block, or, where that is 0, with as many as there are; of
-/// its bit planes, as many as an error of 2^min_exponent needs. The caller sets its bit stream.
+/// A stream at a fixed number of bits per block; 0: each block has its own number. It has as many
+/// bit planes as an error of 2^min_exponent needs. The caller sets its bit stream.
 ZfpStream make_zfp_stream(std::uint32_t bits_per_block, std::int32_t min_exponent = ZFP_MIN_EXP);
 
 }  // namespace isowave::core

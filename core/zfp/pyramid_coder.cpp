@@ -141,7 +141,8 @@ InputOptions input_of_coarser(const CompressOptions &options) {
 
 CompressedVolume describe_compressed(const VolumeInfo &info, const CompressOptions &options) {
   if (options.precision && options.encoder)
-    throw Error("a device compresses at a fixed rate only: leave the device, or the error bound");
+    throw Error(
+        "a device compresses at a fixed rate only: leave out the device or the error bound");
   if (!options.precision && (options.rate < 1 || options.rate > 32))
     throw Error("rate {}: must be 1 to 32 bits per voxel", options.rate);
   check_volume_info(info, "volume");

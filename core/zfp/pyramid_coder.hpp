@@ -28,10 +28,10 @@ InputOptions input_of_coarser(const CompressOptions &options);
 /// Compresses the voxels of a level.
 class LevelCoder : public ChunkCoder {
  public:
-  /// After the last chunk: hands over what is left, and completes `volume`. Returns what was to be
-  /// kept of each block's errors, where they were measured.
+  /// After the last chunk: hands over what is left, and completes `volume`. Returns the errors of
+  /// blocks that were to be kept, if they were measured.
   virtual std::vector<float> finish(CompressedVolume &volume) = 0;
-  /// The last chunk's voxels as they are decoded, where errors are measured.
+  /// The last chunk's voxels as they are decoded, if errors are measured.
   virtual std::span<const float> decoded() const = 0;
 };
 
@@ -41,11 +41,11 @@ class PyramidCoder : public ChunkCoder {
   /// Takes layers of the next level, in order, before they are checked.
   using NextLevel = std::function<void(const Chunk &)>;
 
-  /// volumes, sinks  of this level and all coarser ones. Those are compressed on the host, since
-  ///                 they are needed as they are decoded, and are a seventh. As options, must
-  ///                 outlive this
+  /// volumes, sinks  of this level and all coarser ones; like options, must outlive this. The host
+  ///                 compresses the coarser ones, a seventh of all, since their decoded voxels are
+  ///                 needed
   /// is_finest       this level is the volume itself
-  /// keep_errors     of each block, where they are measured
+  /// keep_errors     keeps the errors of each block, if they are measured
   PyramidCoder(const CompressOptions &options, std::span<CompressedVolume *const> volumes,
                std::span<const PayloadSink> sinks, bool is_finest, bool keep_errors,
                NextLevel next_level = {});
@@ -60,7 +60,8 @@ class PyramidCoder : public ChunkCoder {
   /// off  how far this level's blocks are from the source; of the finest, none
   void finish(const LevelBounds::Off &off = {});
 
-  // What finish() does, for callers who put parts of volumes together: each once, in this order.
+  // The steps of finish(), for callers that put parts of volumes together: each once, in this
+  // order.
 
   /// Completes this level's volume but for its bounds. Returns the errors that were to be kept.
   std::vector<float> finish_level() {

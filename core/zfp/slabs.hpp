@@ -22,14 +22,14 @@ struct LayerRange {
   bool empty() const { return begin == end; }
 };
 
-/// The layers that both have.
+/// The layers that both ranges have.
 LayerRange common_layers(const LayerRange &a, const LayerRange &b);
 
 std::uint32_t num_block_layers(const VolumeInfo &info);
 /// The layers of voxels of these layers of blocks of a level.
 LayerRange voxel_layers(const VolumeInfo &info, const LayerRange &blocks);
 
-/// `values` has per_layer values for each layer of `all`: those of `some`.
+/// The values of layers `some` from `values`, which has per_layer values for each layer of `all`.
 template <class Value>
 std::span<Value> values_of(std::span<Value> values, std::size_t per_layer, const LayerRange &all,
                            const LayerRange &some) {
@@ -38,8 +38,8 @@ std::span<Value> values_of(std::span<Value> values, std::size_t per_layer, const
 
 /// How a level is cut into slabs.
 struct LevelCuts {
-  /// Layers of blocks of each rank's slab, and those that it works on: with as many of its
-  /// neighbours' as the next level's slab depends on.
+  /// Layers of blocks of each rank's slab, and the layers that the rank works on: also those of its
+  /// neighbours that the next level's slab depends on.
   std::vector<LayerRange> own, worked;
 };
 
@@ -48,8 +48,8 @@ struct LevelCuts {
 /// levels  the grids, the finest first
 std::vector<LevelCuts> cut_levels(std::span<const VolumeInfo> levels, std::uint32_t size);
 
-/// This process's share of the volume's layers of blocks, for InputOptions; none, where there are
-/// fewer than processes.
+/// This process's share of the volume's layers of blocks, for InputOptions; none if there are fewer
+/// layers than processes.
 VolumePart own_part(Team &team, const VolumeInfo &whole);
 
 /// A reader of so many layers from part.begin on. All processes make the same call.

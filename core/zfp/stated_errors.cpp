@@ -16,7 +16,7 @@ namespace isowave::core {
 
 namespace {
 
-/// What errors, and their sums here, may have lost in double precision.
+/// Part that errors, and their sums here, may have lost in double precision.
 constexpr double kRounding = 0x1p-40;
 
 std::string name_of(const CompressedVolume &volume) {

@@ -1,6 +1,6 @@
 #pragma once
-// What a file says of its voxels' values and errors, against its own blocks. The source is not
-// there, so an error against it may still be a lie: only what contradicts the blocks is found.
+// Compares the values and errors that a file states with its own blocks. Only contradictions to the
+// blocks are found: the source is not there, so an error against it may still be a lie.
 
 #include <array>
 #include <string>

@@ -15,15 +15,15 @@ struct VoxelRegion {
   glm::uvec3 end{0};
   glm::uvec3 step{1};
 
-  /// Voxels along each axis, where check_region() has nothing against it.
+  /// Voxels along each axis, if check_region() accepts the region.
   glm::uvec3 dims() const { return (end - begin - 1u) / step + 1u; }
 };
 
 /// Throws  Error unless each side has a voxel, and all are voxels of a volume of dims
 void check_region(const VoxelRegion &region, const glm::uvec3 &dims);
 
-/// Decodes a region. Only blocks with voxels of it are decoded, and only they are read where the
-/// volume is in a file. The bits are decode_with_libzfp()'s.
+/// Decodes a region. Only blocks with voxels of the region are decoded, and read if the volume is
+/// in a file. The bits are decode_with_libzfp()'s.
 ///
 /// out     [nz][ny][nx] of region.dims()
 /// Throws  Error: check_region(); a file is shorter than it was, or cannot be read

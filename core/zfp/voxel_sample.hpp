@@ -8,8 +8,8 @@
 
 namespace isowave::core {
 
-/// Decodes blocks that are spread over the volume; all of them, where these have at most max_voxels
-/// voxels. Always the same ones.
+/// Decodes blocks that are spread over the volume, always the same ones; all blocks if they have at
+/// most max_voxels voxels.
 ///
 /// Returns  their voxels without padding, about max_voxels, in no order that means anything
 /// Throws   Error: a file is shorter than it was, or cannot be read

@@ -48,7 +48,7 @@ class BlockCodec {
   }
   std::span<const std::uint64_t> words() const { return words_; }
 
-  /// What is left of the block with the bit planes of min_exponent: x + 4y + 16z.
+  /// The block's values with the bit planes of min_exponent: x + 4y + 16z.
   const std::array<float, ISO_BLOCK_VOXELS> &decode(std::int32_t min_exponent) {
     set_planes(min_exponent);
     zfp_stream_rewind(stream_.get());
@@ -129,7 +129,7 @@ class ErrorMeter : public ChunkCoder {
     }
   }
 
-  /// What other processes have found counts, too.
+  /// Adds what other processes have found.
   void merge(Team &team) {
     const std::size_t width = kMaxCandidates + 1;
     std::vector<double> own(width);
@@ -185,7 +185,7 @@ Candidates candidates_for(VoxelType type, double tolerance) {
   // fit a file's header.
   constexpr std::int32_t kLastPlane = 130;
   const std::int32_t promised = std::min(std::ilogb(tolerance), kLastPlane);
-  // Where the cast to float32, or to 0, may have taken a part of the tolerance, half of the rest is
+  // If the cast to float32, or to 0, may have taken a part of the tolerance, half of the rest is
   // enough: a block that does not have all its planes by then has lost a quarter at most.
   const bool may_lose = !fits_float32(type) || tolerance < 0x1p-80;
   return {promised - (may_lose ? 1 : 0), promised + kNumFewer};
@@ -209,8 +209,7 @@ BlockPrecision choose_by_tolerance(VolumeReader &reader, double tolerance,
   if (!best) {
     throw Error(
         "a tolerance of {} cannot be kept: voxels are stored as float32, and with all bit planes "
-        "off by up "
-        "to {}; "
+        "off by up to {}; "
         "give at least that",
         tolerance, printed_bound(meter.error(0)));
   }

@@ -1,5 +1,5 @@
 #pragma once
-// Volumes with a bound on the error: zfp's fixed-accuracy mode, where blocks are as long as the
+// Volumes with a bound on the error: zfp's fixed-accuracy mode, in which blocks are as long as the
 // error demands.
 
 #include <optional>

@@ -94,7 +94,7 @@ class ZfpFileReader {
     if (!has_trailer_ || volume_.info.dims != coarser_level(finer.volume_.info).dims ||
         volume_.precision.whole_numbers)
       refuse_level();
-    // What a level says of its grid and range of values is not needed, so it cannot be wrong.
+    // The grid and range of values that a level states are not read, so they cannot be wrong.
     volume_.info = coarser_level(finer.volume_.info);
     volume_.value_range = kUnknownRange;
     layout_.counts_casts = finer.layout_.counts_casts;
@@ -130,7 +130,7 @@ class ZfpFileReader {
     return stream_bytes_ + layout_.index_bytes + layout_.bounds_bytes + layout_.no_data_bytes;
   }
 
-  /// That of everything before the trailer.
+  /// Checks the checksum of everything before the trailer.
   void check_sum() const {
     if (!has_trailer_) return;
     std::vector<std::byte> piece(1u << 16);
@@ -186,8 +186,8 @@ class ZfpFileReader {
     }
   }
 
-  /// Which voxels of another writer's block have no data: those that are NaN. Refuses those that
-  /// cannot be drawn.
+  /// The voxels without data of another writer's block, which are NaN. Refuses voxels that cannot
+  /// be drawn.
   std::uint64_t judge_voxels(std::uint64_t block, std::span<const float> values) const {
     std::uint64_t missing = 0, refused = 0;
     for (std::size_t i = 0; i < values.size(); ++i) {
@@ -263,8 +263,7 @@ class ZfpFileReader {
     if (volume_.is_indexed() && !has_trailer_)
       fail(
           "a file of zfp's own tool does not say where its blocks begin: decode it by zfp -h -z, "
-          "and "
-          "convert its voxels");
+          "and convert its voxels");
     CompressedVolume cut = volume_.is_indexed() ? cut_indexed(box) : cut_blocks(volume_, box);
     if (with_bounds && layout_.bounds_bytes != 0) {
       BoundsCutter bounds(volume_.num_blocks(), box);
@@ -441,8 +440,7 @@ class ZfpFileReader {
     if (mode != zfp_mode_fixed_rate) {
       fail(
           "zfp mode '{}': only fixed rate (zfp -r), fixed accuracy (zfp -a) and reversible (zfp "
-          "-R) "
-          "are supported",
+          "-R) are supported",
           kModes.at(mode));
     }
     if (stream.maxbits < kMinBlockBits || stream.maxbits > kMaxBlockBits) {

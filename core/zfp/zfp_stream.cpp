@@ -129,7 +129,7 @@ CompressedVolume compress_to_file(VolumeReader &reader, const CompressOptions &o
 
 BlockPrecision with_fewer_planes(const BlockPrecision &bound, double voxel_error) {
   if (!(voxel_error >= 0) || !std::isfinite(voxel_error))
-    throw Error("a value error of {} cannot be allowed: give 0 or more", voxel_error);
+    throw Error("a voxel error of {} cannot be allowed: give 0 or more", voxel_error);
   const std::int32_t min_exponent = voxel_error > 0 ? std::ilogb(voxel_error) : ISO_ALL_PLANES;
   if (min_exponent <= bound.min_exponent || bound.is_reversible()) return bound;
   return {min_exponent, false, {}};  // rounding would only add to the error

@@ -27,24 +27,24 @@ struct CompressOptions;
 
 /// Takes a level's payload in order.
 using PayloadSink = std::function<void(std::span<const std::byte>)>;
-/// Makes what compresses a level of those dims. keep_errors: of each block.
+/// Makes the coder of a level of those dims. keep_errors: keeps the errors of each block.
 using CoderMaker = std::function<std::unique_ptr<LevelCoder>(
     const glm::uvec3 &dims, const CompressOptions &options, const PayloadSink &sink,
     bool keep_errors)>;
 
-/// How much of its voxels a volume keeps whose blocks have lengths of their own.
+/// The precision of a volume whose blocks have lengths of their own.
 struct BlockPrecision {
   /// Bit planes of blocks end where zfp can promise an error of at most 2^min_exponent (its
   /// fixed-accuracy mode). ISO_REVERSIBLE: nothing is lost of float32 (its reversible mode).
   std::int32_t min_exponent = ISO_ALL_PLANES;
-  bool whole_numbers = false;  ///< decoded values are rounded: the source's, which are integers
+  bool whole_numbers = false;               ///< decoded values are rounded to the source's integers
   std::optional<double> max_voxel_error{};  ///< largest |decoded - source|, measured
 
   bool is_reversible() const { return min_exponent == ISO_REVERSIBLE; }
 };
 
-/// Drops the bit planes that a value error of at most voxel_error can spare. 0 drops none. Blocks
-/// of reversible streams can spare none.
+/// Drops the bit planes that an error of at most voxel_error allows to leave out. 0 drops none.
+/// Blocks of reversible streams can spare none.
 BlockPrecision with_fewer_planes(const BlockPrecision &bound, double voxel_error);
 
 struct CompressOptions {
@@ -66,8 +66,8 @@ struct CompressOptions {
 struct BlockBounds {
   std::vector<std::uint8_t> codes{};
   std::int32_t exponent = 0;
-  /// A voxel is off by its share (bound_share()) at most. Only where voxels are compared with the
-  /// source's.
+  /// Whether a voxel is off by at most its share (bound_share()) of the block's bound: only if
+  /// voxels are compared with the source's.
   bool by_place = false;
   /// A brick's level: the largest code in all bricks, which decides what float32 loses.
   std::uint8_t largest_of_whole = 0;
@@ -77,11 +77,11 @@ struct BlockBounds {
 inline constexpr std::array<float, 2> kUnknownRange = {-std::numeric_limits<float>::infinity(),
                                                        std::numeric_limits<float>::infinity()};
 
-/// Words past its last bit that a decoder reads at most.
+/// Most words past a block's last bit that a decoder reads.
 inline constexpr std::uint64_t kDecoderAhead = 2;
 
-/// A zfp volume in host memory or in a file, at a fixed rate or of blocks as long as the error
-/// allows.
+/// A zfp volume in host memory or in a file, at a fixed rate, or with blocks as long as the error
+/// demands.
 struct CompressedVolume {
   VolumeInfo info;  ///< type is that of the source before compression
   /// 64 * rate; from other writers 9..2048 (1 + 8 bits hold the exponent). 0: blocks have lengths
@@ -89,21 +89,20 @@ struct CompressedVolume {
   std::uint32_t bits_per_block = 0;
   BlockPrecision precision{};  ///< at a fixed rate, as it is from the start
   std::vector<std::uint32_t>
-      index{};  ///< where blocks begin that have lengths of their own: block_index.h
+      index{};  ///< places where blocks with lengths of their own begin: block_index.h
   std::uint64_t indexed_bits = 0;  ///< length of all of them
-  /// Payload from bit 0, little endian; two zero words follow the last bit. Empty where file is
-  /// set,
+  /// Payload from bit 0, little endian; two zero words follow the last bit. Empty if `file` is set.
   std::vector<std::uint32_t> words;
-  std::shared_ptr<const InputFile> file{};  ///< which holds the payload instead,
-  std::uint64_t file_first_bit = 0;         ///< from this bit on.
+  std::shared_ptr<const InputFile> file{};  ///< holds the payload instead of `words`
+  std::uint64_t file_first_bit = 0;         ///< first bit of the payload in the file
   NoData no_data{};                         ///< its voxels without data
   /// [min, max] of the source's voxels with data, as float32 and after map_nan.
   std::array<float, 2> value_range = kUnknownRange;
-  /// Largest |decoded - source| of voxels with data, when it was measured. What a device measured
-  /// may be larger: it counts the other voxels, too.
+  /// Largest |decoded - source| of voxels with data, if it was measured. An error that a device has
+  /// measured may be larger: it includes voxels without data.
   std::optional<double> max_voxel_error{};
-  BlockBounds bounds{};  ///< of a level of detail; no codes: not known
-  /// max_voxel_error and bounds, of all levels, are what a file says: its writer may be wrong, or
+  BlockBounds bounds{};  ///< bounds of a level of detail; no codes: not known
+  /// Whether a file states max_voxel_error and bounds of all levels: its writer may be wrong, or
   /// lie. false: this process measured them.
   bool errors_are_stated = false;
   /// Levels of detail, each of half the voxels along each axis: pyramid.hpp.
@@ -122,9 +121,9 @@ struct CompressedVolume {
   std::uint32_t max_block_bits() const {
     return is_indexed() ? ISO_MAX_BLOCK_BITS : bits_per_block;
   }
-  /// Bits per voxel, of partial blocks' padding too; the index not counted.
+  /// Bits per voxel, with the padding of partial blocks, without the index.
   double rate() const { return double(payload_bits()) / (64.0 * double(block_count())); }
-  /// Size of words, or what it would be.
+  /// Size of `words`, also if the payload is in a file.
   std::uint64_t word_count() const;
   /// Copies 32 * out.size() bits of the payload from bit `bit` on, wherever it is; zeros behind its
   /// end.
@@ -133,8 +132,8 @@ struct CompressedVolume {
   void read_words(std::uint64_t bit, std::span<std::uint32_t> out) const;
 };
 
-/// Copies bits [bit, bit + count) of `bytes`, little endian, to `out`, which they fit; the rest of
-/// it becomes 0.
+/// Copies bits [bit, bit + count) of `bytes`, little endian, to `out`, which is large enough; the
+/// rest of `out` becomes 0.
 void copy_bits(std::span<const std::byte> bytes, std::uint64_t bit, std::uint64_t count,
                std::span<std::uint32_t> out);
 
@@ -145,9 +144,9 @@ void set_spacing(CompressedVolume &volume, const glm::dvec3 &spacing);
 ///
 /// Throws  Error: bad rate, NaN, short file, more levels than it can have
 CompressedVolume compress(VolumeReader &reader, const CompressOptions &options);
-/// As compress(), but straight to a file and in memory O(nx * ny), and with levels 5 bytes for each
-/// block, 9 where float32 does not hold all voxels. Writes to a temporary name and renames; nothing
-/// is left behind on an error. Returns what was written, but for the words, which stay empty.
+/// As compress(), but straight to a file. Memory is O(nx * ny), and with levels 5 bytes a block (9
+/// if float32 does not hold all voxels). Writes to a temporary name and renames; leaves nothing
+/// behind on an error. Returns the volume that was written, with empty words.
 CompressedVolume compress_to_file(VolumeReader &reader, const CompressOptions &options,
                                   const std::filesystem::path &path);
 
@@ -171,8 +170,9 @@ CompressedVolume check_zfp_file(const std::filesystem::path &path);
 /// As check_zfp_file(), but neither reads nor checks the payload, index and bounds.
 CompressedVolume read_zfp_file_info(const std::filesystem::path &path);
 
-/// Decodes everything with libzfp: [nz][ny][nx] float32, NaN of voxels without data, by as few bit
-/// planes as voxel_error allows: see with_fewer_planes(). The ground truth of every decoder here.
+/// Decodes everything with libzfp: [nz][ny][nx] float32; voxels without data are NaN. Uses as few
+/// bit planes as voxel_error allows: see with_fewer_planes(). The ground truth of every decoder
+/// here.
 std::vector<float> decode_with_libzfp(const CompressedVolume &volume, double voxel_error = 0);
 
 }  // namespace isowave::core

@@ -32,7 +32,7 @@ std::uint32_t combine_crcs(std::uint32_t first, std::uint32_t second, std::uint6
 /// The checksum of the JSON text and of the footer's numbers before json_crc.
 std::uint32_t json_crc(std::string_view text, const ZfpFooter &footer);
 
-/// What the JSON text says of the file itself.
+/// The parts of a file, from the JSON text.
 struct ZfpLayout {
   std::uint64_t index_bytes = 0, bounds_bytes = 0, no_data_bytes = 0;
   std::vector<std::uint64_t> level_bytes{};  ///< of the coarser levels' files

@@ -63,8 +63,8 @@ ISO_INLINE int request_block(const FrameParams *frame, global const BlockEntry *
   return 0;
 }
 
-/// Puts a marked block at `place` of the list [capacity]; where the list has ended, takes the mark
-/// back.
+/// Puts a marked block at `place` of the list [capacity]; takes the mark back if the list has
+/// ended.
 ISO_INLINE void list_request(const FrameParams *frame, global uint *request_block_ids,
                              uint capacity, volatile global uint *requested_bits, uint place,
                              uint block_id) {

@@ -1,14 +1,17 @@
-/// block_stream.h -- where the bits of a block are on the device (core/stream/device_stream.hpp).
-/// OpenCL C 1.2.
+/// block_stream.h -- the bits of a block on the device (core/stream/device_stream.hpp). OpenCL C
+/// 1.2.
 ///
-/// ISO_STREAM_PARTS, by -D: 1 the whole zfp stream is in part_0. 4: it is cut into up to four
-/// buffers of layout.words_per_part words, each going on so far behind its end that a block which
+/// ISO_STREAM_PARTS, by -D: 1: the whole zfp stream is in part_0. 4: the stream is cut into up to
+/// four buffers of layout.words_per_part words. Each goes on behind its end, so that a block which
 /// begins in it is whole. 0: part_0 is a window that holds only the blocks of this launch, one
-/// after the other, each beginning with a whole word. ISO_STREAM_INDEXED: 0 all blocks are
-/// layout.bits_per_block long. 1: `index` says where they begin (block_index.h); a window begins
-/// with an entry (window_entry()) for each of its blocks, and for the end of the last. A block ends
-/// where its length says, also where that lies: what its bits say by then is decoded, as at a fixed
-/// rate. ISO_STREAM_REVERSIBLE: 1 the stream is a reversible one (zfp_codec.h).
+/// after the other, each beginning with a whole word.
+///
+/// ISO_STREAM_INDEXED: 0: all blocks are layout.bits_per_block long. 1: `index` says where they
+/// begin (block_index.h). A window begins with an entry (window_entry()) for each of its blocks,
+/// and for the end of the last. A block ends at its length, even if the length is wrong: the bits
+/// up to there are decoded as at a fixed rate.
+///
+/// ISO_STREAM_REVERSIBLE: 1: the stream is a reversible one (zfp_codec.h).
 #ifndef ISOWAVE_BLOCK_STREAM_H
 #define ISOWAVE_BLOCK_STREAM_H
 

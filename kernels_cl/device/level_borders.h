@@ -42,10 +42,10 @@ ISO_INLINE int block_at_border(const FrameParams *frame, const Ray *ray, float t
   return is_own(frame, *b);
 }
 
-/// Has the cell in which a ray is at the border at t, within the domain, a corner without data?
+/// Does the cell in which a ray is at the border at t, within the domain, lack data at a corner?
 ///
-/// no_data  the table of no_data.h, of all levels' blocks, in the order of their ranges; none
-///          where ISO_NO_DATA is 0, or no_data_begin is ISO_INVALID_ID
+/// no_data  the table of no_data.h for all levels' blocks, in the order of their ranges; none if
+///          ISO_NO_DATA is 0, or no_data_begin is ISO_INVALID_ID
 ISO_INLINE int lacks_data_at_border(const FrameParams *frame, global const uint *no_data,
                                     uint no_data_begin, const Ray *ray, float t) {
   const LastPlanes last = last_planes(frame);
@@ -64,14 +64,14 @@ ISO_INLINE int lacks_data_at_border(const FrameParams *frame, global const uint 
   return 0;
 }
 
-/// The place where a ray stands that leaves the band of frames[level], or ISO_INVALID_ID: there is
-/// nothing for it behind. If the block behind the border is not as a whole on the ray's side, the
-/// ray stands there, with its side; else at the next active block, in this band or one behind. It
-/// has no side if data lack before the border or behind it.
+/// The place at which a ray stands after it has left the band of frames[level]; ISO_INVALID_ID:
+/// there is nothing for it behind. If the block behind the border is not as a whole on the ray's
+/// side, the ray stands there, with its side. Otherwise it stands at the next active block, in this
+/// band or one behind. The ray has no side if data lack before or behind the border.
 ///
-/// side     on which it left; unknown: the border is in a block that is as a whole on one, or in a
-///          cell without data
-/// ranges   of all levels' blocks
+/// side     side on which the ray left; unknown: the border is in a block that is as a whole on one
+///          side, or in a cell without data
+/// ranges   ranges of all levels' blocks
 /// no_data  as lacks_data_at_border
 /// found    [1] scratch
 ISO_INLINE uint cross_borders(global const FrameParams *frames, uint num_frames,
@@ -117,8 +117,8 @@ ISO_INLINE uint cross_borders(global const FrameParams *frames, uint num_frames,
   const FrameParams *frame = ((void)frames, (void)num_frames, &frame_params)
 #endif
 
-/// find_blocks() for a ray that stands at block *block_id, which it looks into though it may not be
-/// active where it has a side.
+/// find_blocks() for a ray that stands at block *block_id. A ray with a side looks into this block
+/// even if the block is not active.
 ISO_INLINE uint find_blocks_from(const FrameParams *frame, global const uint *macrocell_masks,
                                  const Ray *ray, uint side, uint *block_id, uint wanted,
                                  local uint *found) {

@@ -1,4 +1,4 @@
-/// level_requests.h -- which of a pass's requests are for a level of detail. OpenCL C 1.2. Where
+/// level_requests.h -- which of a pass's requests are for a level of detail. OpenCL C 1.2. If
 /// ISO_LEVELS is 0, all are, and nothing here costs anything.
 #ifndef ISOWAVE_LEVEL_REQUESTS_H
 #define ISOWAVE_LEVEL_REQUESTS_H
@@ -8,8 +8,8 @@
 
 #define ISO_LEVEL_SLOTS (ISO_LEVELS ? ISO_GROUP_SIZE : 1)  ///< entries of to_slots
 
-/// The request that is number i of this launch's. places: which they are, where a window of the
-/// stream has the blocks of one level alone.
+/// Request number i of this launch. places: the launch's requests, if a window of the stream has
+/// the blocks of only one level.
 ISO_INLINE uint place_of(global const uint *places, uint i) {
   if (!ISO_LEVELS) return i;
   return ISO_STREAM_PARTS == 0 ? places[i] : i;

@@ -42,8 +42,7 @@ typedef struct BlockChange {
   CellChange change;
   CellWalk at;
   float w[8];
-  int at_border;  ///< it is where the cell is entered: a level of detail has another opinion than
-                  ///< the one before
+  int at_border;  ///< the change is where the cell is entered, since two levels of detail disagree
 } BlockChange;
 
 ISO_INLINE int changes_at_border(const BlockChange *found) {

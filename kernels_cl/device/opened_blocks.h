@@ -30,7 +30,7 @@ ISO_INLINE uint opened_place(BlockCoords b) {
   return (b.x & 3) + 4 * (b.y & 3) + 16 * (b.z & 3);
 }
 
-/// Copies the voxels of a corner of the dual grid to where they are in it.
+/// Copies the voxels of a corner of the dual grid to their places in it.
 ISO_INLINE void copy_corner(global const float *values, uint corner, float *voxels) {
   const uint rows = (corner & 2u) != 0 ? 1 : 4, layers = (corner & 4u) != 0 ? 1 : 4;
   float *to = voxels + ((corner & 1u) != 0 ? 4 : 0) + ((corner & 2u) != 0 ? 20 : 0) +

@@ -1,4 +1,4 @@
-/// ray_lanes.h -- several work-items for each ray, where rays are few. OpenCL C 1.2.
+/// ray_lanes.h -- several work-items for each ray if there are few rays. OpenCL C 1.2.
 #ifndef ISOWAVE_RAY_LANES_H
 #define ISOWAVE_RAY_LANES_H
 

@@ -1,5 +1,4 @@
-/// ray_source.h -- where the rays of pipeline `rays` come from: the camera, or a list. OpenCL
-/// C 1.2.
+/// ray_source.h -- the source of the rays of pipeline `rays`: the camera, or a list. OpenCL C 1.2.
 #ifndef ISOWAVE_RAY_SOURCE_H
 #define ISOWAVE_RAY_SOURCE_H
 
@@ -7,7 +6,7 @@
 
 /// The ray with this number, in the index space of the frame's level.
 ///
-/// given  [pixel] the list; not read where ISO_GIVEN_RAYS is 0
+/// given  [pixel] the list; not read if ISO_GIVEN_RAYS is 0
 ISO_INLINE Ray ray_of(const FrameParams *frame, global const GivenRay *given, uint pixel) {
 #if ISO_GIVEN_RAYS
   Ray ray = make_given_ray(given[pixel]);

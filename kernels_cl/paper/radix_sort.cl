@@ -9,7 +9,7 @@
 ///
 /// Two ways to rank the pairs of a tile, by -D ISO_RADIX_SERIAL: 0, all work-items of a group
 /// together (place_round); 1, the first work-item alone, one after the other: four times as fast on
-/// a CPU, where work-items are turns of a loop and atomics are dear (PoCL).
+/// a CPU whose work-items are turns of a loop and whose atomics are slow (PoCL).
 #include "device/work_group.h"
 #include "portable/radix_sort.h"
 

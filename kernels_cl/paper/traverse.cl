@@ -14,7 +14,7 @@
 #include "portable/ray_state.h"
 #include "portable/window.h"
 
-/// Finds the next active blocks of each ray: N_Spec at most, fewer where a ray has its own number
+/// Finds the next active blocks of each ray: N_Spec at most, fewer if a ray has its own number
 /// (frame->schedule.per_ray_speculation).
 ///
 /// macrocell_masks  [2 * coarse cells] bit x + 4y + 16z of a block in its coarse cell

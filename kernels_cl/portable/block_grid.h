@@ -69,9 +69,8 @@ ISO_INLINE int is_own(const FrameParams *frame, BlockCoords b) {
          b.z >= frame->brick.before_z && b.z + frame->brick.behind_z < frame->grid.blocks_z;
 }
 
-/// The block that stands for `stride` blocks from `begin` on: any of them, by a hash. Always the
-/// first would be blind where the stride is a multiple of the blocks along x: all on one face of
-/// the volume.
+/// The block that stands for `stride` blocks from `begin` on: any of them, by a hash. If the stride
+/// is a multiple of the blocks along x, the first ones would all lie on one face of the volume.
 ISO_INLINE uint sampled_block(uint begin, uint stride) {
   uint h = begin * 0x9E3779B1u;
   h = (h ^ (h >> 15)) * 0x2C1B3C6Du;
@@ -88,8 +87,8 @@ ISO_INLINE uint dual_grid_block(const FrameParams *frame, BlockCoords b, uint co
              : ISO_INVALID_ID;
 }
 
-/// Is there such a block, where a ray has touched it? Rays of several levels of detail touch only
-/// blocks of their own, which another level's frame does not know.
+/// Is there such a block, given that a ray has touched it? Rays of several levels of detail touch
+/// only blocks of their own, which another level's frame does not know.
 ISO_INLINE int exists_where_touched(const FrameParams *frame, BlockCoords b, uint corner) {
   return ISO_LEVELS || dual_grid_block(frame, b, corner) != ISO_INVALID_ID;
 }

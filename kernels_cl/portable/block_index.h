@@ -1,9 +1,9 @@
-/// block_index.h -- where the blocks of a zfp stream begin whose blocks have lengths of their
-/// own: 2.5 bytes a block.
+/// block_index.h -- the places where blocks with lengths of their own begin in a zfp stream: 2.5
+/// bytes a block.
 ///
 /// Sixteen blocks share ten words: the first bit of the first one, in 64 bits, and from there the
-/// first bit of each, in 16 bits. One more entry than there are blocks: where the last one ends.
-/// Portable: OpenCL C 1.2 and C++.
+/// first bit of each, in 16 bits. One more entry than there are blocks says where the last one
+/// ends. Portable: OpenCL C 1.2 and C++.
 #ifndef ISOWAVE_BLOCK_INDEX_H
 #define ISOWAVE_BLOCK_INDEX_H
 
@@ -31,8 +31,8 @@ ISO_INLINE ulong block_begin(ISO_GLOBAL const uint *index, uint block_id) {
   return ((ulong)group[1] << 32 | group[0]) + (pair >> 16u * (block_id & 1u) & 0xFFFFu);
 }
 
-/// In a window, blocks begin with whole words, and an entry before them says where, and how many of
-/// the bits before the next block are not this one's, 0 to 31. first_word: below 2^27.
+/// The entry of a block in a window: the whole word that the block begins with, and how many bits
+/// before the next block are not this one's, 0 to 31. first_word: below 2^27.
 ISO_INLINE uint window_entry(uint first_word, uint unused_bits) {
   return first_word << 5 | unused_bits;
 }

@@ -76,7 +76,7 @@ ISO_INLINE uint find_entry(const FrameParams *frame, ISO_GLOBAL const BlockEntry
   return key == block_id ? i : ISO_INVALID_ID;
 }
 
-/// The entries of the dual grid of block (x,y,z): corner x + 2y + 4z; slot ISO_BLOCK_ABSENT where a
+/// The entries of the dual grid of block (x,y,z): corner x + 2y + 4z; slot ISO_BLOCK_ABSENT if a
 /// block is not cached. All eight are read before one is looked at: a GPU waits once, not eight
 /// times.
 ISO_INLINE void find_dual_grid(const FrameParams *frame, ISO_GLOBAL const BlockEntry *table, uint x,

@@ -42,8 +42,8 @@ ISO_INLINE ulong moved_z(ulong cells, ulong before) {
   return cells << 16 | before >> 48;
 }
 
-/// Those of the given edges of block b that belong to a cell of cells_with_data(), of this block or
-/// of one before it.
+/// The given edges of block b that belong to a cell of cells_with_data(), of this block or of one
+/// before it.
 ISO_INLINE BlockEdges edges_with_data(const FrameParams *frame, const BlockGrid *grid,
                                       NoDataTable no_data, BlockCoords b, BlockEdges edges) {
   BlockEdges kept = edges;

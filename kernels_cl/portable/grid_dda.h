@@ -11,8 +11,8 @@
 /// same cells with the same bits, and a ray's state between passes is just a block.
 ///
 /// Float filter: processors compare moments in float32 first. float_t() rounds three times: plane -
-/// o, 1 / d and their product. Each is off by at most u = 2^-24 of itself, 1 / d by 5 u where a
-/// device divides within 2.5 ulp, as OpenCL allows. So a moment in float32 is off by at most 7.1 u
+/// o, 1 / d and their product. Each is off by at most u = 2^-24 of itself, 1 / d by 5 u if a device
+/// divides within 2.5 ulp, as OpenCL allows. So a moment in float32 is off by at most 7.1 u
 /// of itself, and the two-float one by far less than the 0.1. Two moments that are further apart
 /// than 16 u = 2^-20 of the one with the larger magnitude are in the order that two-float finds:
 /// 14.2 u cover what both are off by, the rest covers the rounding of their difference. If the
@@ -47,7 +47,7 @@ ISO_NAMESPACE_BEGIN
 typedef struct RayAxis {
   float o;         ///< eye, index space [voxels]
   float d;         ///< direction [voxels per t]; exactly 0 or at least ISO_SMALLEST_DIRECTION
-  TwoFloat inv_d;  ///< 1 / d; unused where d = 0
+  TwoFloat inv_d;  ///< 1 / d; unused if d = 0
   float origin;    ///< where regions count from, see BrickPlace
 } RayAxis;
 
@@ -204,10 +204,11 @@ ISO_INLINE int is_above(RayAxis a, int axis, int plane, RayEvent e) {
   return crossed == (a.d > 0.0f);
 }
 
-/// The region along one axis, within [first, last], that the ray is in just after event `e`. Where
-/// the position o + t d is further from a plane than its error, 2^-24 (|t d| + |o + t d|), it
-/// decides; else crossings are compared. A brick's origin comes off the position without rounding:
-/// behind it, both are multiples of the position's ulp; just before it, they are nearly alike.
+/// The region along one axis, within [first, last], that the ray is in just after event `e`. The
+/// position o + t d decides if it is further from a plane than its error, 2^-24 (|t d| + |o + t
+/// d|); otherwise crossings are compared. A brick's origin is subtracted from the position without
+/// rounding: behind the origin, both are multiples of the position's ulp; just before it, they are
+/// nearly alike.
 ISO_INLINE int locate(RayAxis a, int axis, RayEvent e, int size, int first, int last) {
   const float p = a.d == 0.0f ? a.o : fma(e.t.hi, a.d, a.o);
   const float error = 0x1p-22f * (fabs(p) + fabs(a.o));
@@ -310,8 +311,8 @@ ISO_INLINE RayEvent first_exit(const Ray *r, float far_x, float far_y, float far
 }
 
 #ifdef ISO_FLOAT_FILTER
-/// The same; two-float finds the moment of the one exit, and the order only where float32 leaves it
-/// in doubt.
+/// The same; two-float finds the moment of the exit, and the order only if float32 leaves it in
+/// doubt.
 ISO_INLINE RayEvent walk_exit(const GridWalk *w, const Ray *r) {
   const int y_first = w->t_y < w->t_x;
   const float xy = y_first ? w->t_y : w->t_x, not_xy = y_first ? w->t_x : w->t_y;

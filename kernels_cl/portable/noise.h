@@ -119,8 +119,8 @@ ISO_INLINE double noise_jet(const NoiseShape s, uint x, uint y, uint z, double a
   return inside / 0.03 + growth * (a + b / (decay * decay));
 }
 
-/// A body as scanners see them: an ellipsoid with bumps, soft within but for thin walls where the
-/// noise b is 0.
+/// A body as scanners see it: an ellipsoid with bumps, soft within except for thin walls at which
+/// the noise b is 0.
 ISO_INLINE double noise_scan(const NoiseShape s, uint x, uint y, uint z, double a, double b) {
   const double from_x = noise_from_middle(x, s.last_x) / s.last_x;
   const double from_y = noise_from_middle(y, s.last_y) / s.last_y;

@@ -5,15 +5,15 @@
 /// core/host/float8.hpp: Floats, Ints and Mask (-1 or 0 in each lane), the functions of OpenCL C
 /// that are used here, and those that both list.
 ///
-/// Moments are float32 where a walk decides by them. Lanes that these leave in doubt (grid_dda.h)
-/// ask the scalar functions, one by one.
+/// A walk decides by moments in float32. Lanes that they leave in doubt (grid_dda.h) ask the scalar
+/// functions, one by one.
 #ifndef ISOWAVE_PACKET_H
 #define ISOWAVE_PACKET_H
 
 ISO_PACKET_NAMESPACE_BEGIN
 
-/// One axis of eight rays, as RayAxis. packet_float_t() of a plane is (plane - from) * rate, also
-/// where d = 0.
+/// One axis of eight rays, as RayAxis. packet_float_t() of a plane is (plane - from) * rate, even
+/// if d = 0.
 typedef struct PacketAxis {
   Floats o, d, inv_hi, inv_lo, from, rate;
   float origin;
@@ -205,7 +205,7 @@ ISO_INLINE Floats of_axis(Ints axis, Floats x, Floats y, Floats z) {
   return pick(axis == 0, x, pick(axis == 1, y, z));
 }
 
-/// When they entered the regions where they are, in float32.
+/// The moments at which rays entered their regions, in float32.
 ISO_INLINE Floats entry_t(const PacketRays *r) {
   const Ints axis = r->entered.axis;
   const Floats from = of_axis(axis, r->axis[0].from, r->axis[1].from, r->axis[2].from),

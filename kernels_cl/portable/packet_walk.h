@@ -22,12 +22,12 @@ ISO_INLINE Ints bits_between(Ints first, Ints last) {
   return (ints(2) << last) - (ints(1) << first);
 }
 
-/// Lets lanes enter the regions of a level within those of the next larger one, where they are, but
-/// for lanes on whose way there none is to be entered.
+/// Lets lanes enter the regions of a level within their region of the next larger level, except
+/// lanes on whose way there is no region to enter.
 ///
-/// A ray's way is within the box of the regions where it enters and leaves the larger one. The
-/// latter need not be known exactly: positions are off by less than `error` (packet_locate()),
-/// which makes the box larger.
+/// A ray's way is within the box of the regions in which it enters and leaves the larger one. The
+/// region in which it leaves need not be known exactly: positions are off by less than `error`
+/// (packet_locate()), which makes the box larger.
 ISO_INLINE void enter_regions(Packet *p, const PacketScene *scene, int level, Mask lanes) {
   const int size = ISO_REGION_SIZE(level);
   PacketLevel *l = &p->level[level];

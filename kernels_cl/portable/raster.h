@@ -101,8 +101,8 @@ ISO_INLINE uint end_pixel(float at, uint count) {
 }
 
 /// The pixels whose rays may meet the triangle: those whose centres are in its bounding box, or no
-/// more beside it than rounding can do. All of the picture where the triangle crosses the plane of
-/// the eye: without being beside the picture, only those next to the eye do that.
+/// more beside it than rounding can do. If the triangle crosses the plane of the eye, all pixels:
+/// such a triangle is next to the eye, or beside the picture.
 ISO_INLINE PixelBox triangle_box(const FrameParams *frame, const RasterView *view,
                                  const ViewTriangle *p) {
   const uint width = frame->view.width, height = frame->view.height;
@@ -137,8 +137,8 @@ ISO_INLINE uint box_pixels(PixelBox box) {
              : 0u;
 }
 
-/// a b - c d. Its sign is never the wrong one: products are taken exactly, as two floats, and where
-/// the highs do not differ, the lows do, or it is 0. Swapping the products changes the sign alone.
+/// a b - c d. Its sign is never wrong: products are taken exactly, as two floats. If their highs do
+/// not differ, their lows do, or the result is 0. Swapping the products changes only the sign.
 ISO_INLINE float side_of_edge(float a, float b, float c, float d) {
   const float ab = a * b, cd = c * d;
   return (ab - cd) + (fma(a, b, -ab) - fma(c, d, -cd));

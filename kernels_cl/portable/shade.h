@@ -96,8 +96,8 @@ ISO_INLINE Color shade_ray(const FrameParams *frame, ISO_CONSTANT const ShadePar
                     fma(p->surface_b, light, highlight));
 }
 
-/// RGBA, 8 bits each, red in bits 0..7: of the pixel at a column and row of the picture, which has
-/// samples times samples rays of the frame. A is 255 where any of them hits, else 0.
+/// RGBA of the pixel at a column and row of the picture, 8 bits each, red in bits 0..7. The pixel
+/// has samples times samples rays of the frame. A is 255 if any of them hits, else 0.
 ///
 /// open_counts  [ray] ambient rays of its hit that met nothing (ambient.h)
 /// num_ambient  ambient rays of a hit; 0: there are none, and all is open

@@ -13,7 +13,7 @@
 /// In a kernel's parameters: the host's buffer has elements of the struct T, and the kernel takes
 /// them as words (README.md of kernels_cl: a cast from the struct is what Mesa rusticl gets wrong).
 #define ISO_WORDS(T) uint
-#ifndef ISO_UNROLL /* by -D: empty where it makes programs slower to compile, not to run */
+#ifndef ISO_UNROLL /* by -D: empty if it makes programs slower to compile, not to run */
 #define ISO_UNROLL _Pragma("unroll")
 #endif
 #ifdef ISO_CPU /* the host says so, of PoCL and llvmpipe: PoCL calls long functions otherwise, \
@@ -183,10 +183,10 @@ ISO_CHECK_SIZE(Schedule, 16);
 /// reads a pointer to constant memory through the cache, again in every turn of a loop.
 typedef struct FrameParams {
   BlockGrid grid;
-  LevelPlace place;  ///< only read where ISO_LEVELS is 1
+  LevelPlace place;  ///< only read if ISO_LEVELS is 1
   BrickPlace brick;
   View view;
-  Band band;  ///< only read where ISO_LEVELS is 1
+  Band band;  ///< only read if ISO_LEVELS is 1
   Surface surface;
   ScreenBox screen;
   Schedule schedule;
@@ -197,7 +197,7 @@ ISO_CHECK_SIZE(FrameParams, 220);
 #define ISO_NOT_TESTED \
   65u  ///< PairHit::cell of a pair whose dual grid got no cache slots in this pass
 #define ISO_IN_DOUBT \
-  128u  ///< added to PairHit::cell where the pair's walk stopped for settle_doubts()
+  128u  ///< added to PairHit::cell if the pair's walk stopped for settle_doubts()
 
 /// The result of one ray-block pair: which of the block's 64 dual cells the ray hits first, and
 /// where.
@@ -247,7 +247,7 @@ typedef struct StreamLayout {
   uint bounds_begin;
   uint bounds_by_place;  ///< not 0: of its block's bound, a voxel has bound_share() of its place
   uint no_data_begin;    ///< word of the index that the table of no_data.h begins with;
-                         ///< ISO_INVALID_ID: all voxels have data. Only read where ISO_NO_DATA is 1
+                         ///< ISO_INVALID_ID: all voxels have data. Only read if ISO_NO_DATA is 1
 } StreamLayout;
 ISO_CHECK_SIZE(StreamLayout, 36);
 

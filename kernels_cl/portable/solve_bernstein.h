@@ -1,10 +1,10 @@
 /// solve_bernstein.h -- sign variations of Bernstein coefficients reject and isolate, bracketed
-/// Newton refines [Yuksel 2022]; where float rounding would decide between crossing and passing by,
+/// Newton refines [Yuksel 2022]. If float rounding would decide between crossing and passing by,
 /// 48-bit arithmetic decides.
 ///
 /// Guarantees: a change of inside between entry and exit is always found. A pair of crossings is
-/// found also where it is shallower than the rounding of the float coefficients. Nothing is divided
-/// by a leading coefficient. The result lies in a bracket whose ends differ in inside. Fails:
+/// found even if it is shallower than the rounding of the float coefficients. Nothing is divided by
+/// a leading coefficient. The result lies in a bracket whose ends differ in inside. Fails:
 /// crossings that only the rounding of the positions of entry and exit (2^-25 voxels) removes or
 /// adds.
 #ifndef ISOWAVE_SOLVE_BERNSTEIN_H
@@ -23,7 +23,7 @@ ISO_NAMESPACE_BEGIN
 /// An answer besides 0 and 1: the sign of something too small decides. See isolate_precisely().
 #define ISO_DOUBTFUL 2
 
-/// s = n / (n + m) where n and m have one sign, so nothing cancels; -1 where they do not.
+/// s = n / (n + m) if n and m have one sign, so nothing cancels; otherwise -1.
 ISO_INLINE float same_sign_fraction(float n, float m) {
   return (n > 0.0f && m > 0.0f) || (n < 0.0f && m < 0.0f) ? n / (n + m) : -1.0f;
 }
@@ -68,8 +68,8 @@ ISO_INLINE float largest_coefficient(Cubic c) {
 ///
 /// No sign variation in the coefficients: no change (the curve lies in their hull). One: exactly
 /// one root, bracketed by [0,1]. More: [0,1] is split at the extrema. An extremum's value depends
-/// on its place only to second order, so its sign is certain unless the value is noise; nor is it
-/// certain that there is an extremum where the derivative's discriminant is noise.
+/// on its place only to second order, so its sign is certain unless the value is noise. If the
+/// derivative's discriminant is noise, it is not certain that there is an extremum.
 ISO_INLINE int isolate_bernstein(Cubic c, Bracket *bracket) {
   const int in0 = c.b0 >= 0.0f, in1 = c.b1 >= 0.0f, in2 = c.b2 >= 0.0f, in3 = c.b3 >= 0.0f;
   bracket->lo = 0.0f;

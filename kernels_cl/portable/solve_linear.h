@@ -1,9 +1,9 @@
 /// solve_linear.h -- repeated linear interpolation between entry and exit [Neubauer et al. 2002].
 ///
-/// Guarantees: where inside differs between entry and exit, a point whose bracket holds a crossing.
-/// Fails: every even number of crossings (a ray that grazes a surface passes through it); of three
-/// crossings it may return any; each step of false position keeps one end fixed on convex curves,
-/// so convergence is linear and a few steps leave an error that grows with curvature.
+/// Guarantees: if inside differs between entry and exit, a point whose bracket holds a crossing.
+/// Fails: it misses every even number of crossings (a ray that grazes a surface passes through it).
+/// It may return any of three crossings. On convex curves, each step of false position keeps one
+/// end fixed, so convergence is linear, and a few steps leave an error that grows with curvature.
 #ifndef ISOWAVE_SOLVE_LINEAR_H
 #define ISOWAVE_SOLVE_LINEAR_H
 

@@ -2,10 +2,10 @@
 /// et al. 2004].
 ///
 /// Guarantees: the first crossing, as long as the extrema that separate crossings are found.
-/// Fails: the extrema come from the quadratic formula in power form. b^2 - 4ac cancels where they
-/// lie close together, so pairs of crossings there (grazing rays) are lost, and dividing by 2a
-/// throws away the extremum that stays when the cubic's leading coefficient vanishes against the
-/// others. The refinement converges as slowly as in solve_linear.h.
+/// Fails: the extrema come from the quadratic formula in power form. b^2 - 4ac cancels if they lie
+/// close together, so pairs of crossings there (grazing rays) are lost. Dividing by 2a throws away
+/// the extremum that stays when the cubic's leading coefficient vanishes against the others. The
+/// refinement converges as slowly as in solve_linear.h.
 #ifndef ISOWAVE_SOLVE_MARMITT_H
 #define ISOWAVE_SOLVE_MARMITT_H
 

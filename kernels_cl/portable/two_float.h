@@ -41,8 +41,8 @@ ISO_INLINE TwoFloat two_sum(float a, float b) {
   return r;
 }
 
-/// Relative error 2^-45 or so where the sum does not cancel; below that of the larger operand where
-/// it does.
+/// The sum, with a relative error of 2^-45 or so if it does not cancel; otherwise with an error
+/// below that of the larger operand.
 ISO_INLINE TwoFloat tf_add(TwoFloat a, TwoFloat b) {
   const TwoFloat high = two_sum(a.hi, b.hi), low = two_sum(a.lo, b.lo);
   const TwoFloat sum = fast_two_sum(high.hi, high.lo + low.hi);

@@ -260,14 +260,15 @@ ordered_json measure_bcmc(const ocl::DeviceInfo &device_info, const PaperRun &ru
                           {.size = run.size,
                            .memory_budget = memory_budget,
                            .stream = StreamPlace::kDevice});  // where rays have it, too
-    renderer.render(run.cameras[0], run.isovalues[0]);
+    renderer.render(request_of(run, 0, 0));
     renderer.clear_cache();
     std::vector<double> new_ms, next_ms, cold_ms, surface_ms, listed, needed, triangles, decoded,
         slots, parts_drawn;
     std::uint64_t num_kept = 0, num_frames = 0;
     each_frame(run, [&](std::size_t i, std::size_t view) {
-      const MeshFrameStats frame = renderer.render(run.cameras[view], run.isovalues[i]);
-      (view == 0 ? new_ms : next_ms).push_back(frame.total_ms);
+      const double ms = renderer.render(request_of(run, i, view)).total_ms;
+      const MeshFrameStats &frame = renderer.last_frame();
+      (view == 0 ? new_ms : next_ms).push_back(ms);
       num_kept += frame.is_kept ? 1 : 0;
       ++num_frames;
       parts_drawn.push_back(frame.num_parts);
@@ -281,7 +282,7 @@ ordered_json measure_bcmc(const ocl::DeviceInfo &device_info, const PaperRun &ru
     });
     for (std::size_t i = 0; i < std::min<std::size_t>(parts.cold, run.isovalues.size()); ++i) {
       renderer.clear_cache();
-      cold_ms.push_back(renderer.render(run.cameras[0], run.isovalues[i]).total_ms);
+      cold_ms.push_back(renderer.render(request_of(run, i, 0)).total_ms);
     }
     json.update({{"new_ms", summary(new_ms)},
                  {"next_ms", summary(next_ms)},
@@ -321,7 +322,7 @@ ordered_json compare_methods(const ocl::DeviceInfo &device_info, const PaperRun 
   ocl::Device device(device_info);
   try {
     MeshRenderer renderer(device, run.volume, {.size = run.size});
-    renderer.render(run.cameras[0], run.isovalues[0]);
+    renderer.render(request_of(run, 0, 0));
     of_mesh = renderer.hits();
     if (!pictures.empty()) write_png(renderer.shade(), pictures + "_bcmc.png");
   } catch (const Error &) {  // too large: measure_bcmc() says so

@@ -1,5 +1,5 @@
 #pragma once
-// What `isowave bench paper` measures of one volume: frames of the ray pipelines and of
+// Measurements of `isowave bench paper` for one volume: frames of the ray pipelines and of
 // Block-Compressed Marching Cubes, at the same isovalues, from the same cameras, on the same
 // device.
 
@@ -41,14 +41,14 @@ struct RayMethod {
   std::uint32_t cache_slots = 0;  ///< 0: the renderer's default
 };
 
-/// What frames took: see bench_paper.cpp for what it says.
+/// Measurements of frames, as JSON (bench_paper.cpp describes it).
 ///
 /// Throws  Error
 nlohmann::ordered_json measure_rays(const ocl::DeviceInfo &device, const PaperRun &run,
                                     const RayMethod &method, const PaperParts &parts);
 
-/// What looking ahead costs in decoding: passes and decoded blocks of cold frames, by the most
-/// blocks that rays look ahead at.
+/// Passes and decoded blocks of cold frames, by the most blocks that rays look ahead at: the cost
+/// of looking ahead.
 ///
 /// Throws  Error
 nlohmann::ordered_json measure_limits(const ocl::DeviceInfo &device, const PaperRun &run,

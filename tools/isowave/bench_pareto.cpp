@@ -72,7 +72,7 @@ CompressionOptions parse_storage(const std::string &text) {
   return options;
 }
 
-/// What a frame shows.
+/// The images of a frame.
 struct View {
   FloatImage depth;
   Image8 picture;
@@ -87,7 +87,7 @@ View view_of(DeviceRenderer &renderer) {
   return view;
 }
 
-/// What a frame should show.
+/// The images that a frame should have.
 struct Truth : View {
   explicit Truth(View view) : View(std::move(view)), flip(picture) {}
   Flip flip;
@@ -253,7 +253,7 @@ double time_ratio(ocl::Device &device, const ParetoSubject &subject, const Point
   return quantiles(std::move(ratios)).p50;
 }
 
-/// What frames need of the volume.
+/// Bytes of the stored volume that frames need.
 std::uint64_t stored_bytes(const CompressedVolume &volume, bool with_levels) {
   std::uint64_t bytes =
       (volume.payload_bits() + 7) / 8 + volume.index.size() * sizeof(std::uint32_t);
@@ -381,7 +381,7 @@ void sweep(ocl::Device &device, const ParetoSubject &subject, const BenchParetoA
   }
 }
 
-/// What render --max-surface-error chooses for each view.
+/// The detail that render --max-surface-error chooses for each view.
 void choose(ocl::Device &device, const ParetoSubject &subject, const BenchParetoArgs &options,
             const Stored &stored, std::vector<Point> &points) {
   if (options.max_surface_errors.empty()) return;

@@ -76,7 +76,7 @@ std::pair<std::string, float> parse_subject(const std::string &argument) {
   return {argument.substr(0, colon), number};
 }
 
-/// Where the failures of a solver are drawn.
+/// File for the picture of a solver's failures.
 std::filesystem::path picture_path(const BenchSolversArgs &options, const std::string &name,
                                    Solver solver) {
   const auto stem = name.substr(0, name.find('_'));

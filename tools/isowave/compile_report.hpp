@@ -1,5 +1,5 @@
 #pragma once
-// What a user hears of kernels being compiled, which takes long on a new machine.
+// Tells the user that kernels are being compiled, which takes long on a new machine.
 
 #include "core/ocl/device.hpp"
 #include "core/ocl/kernel_cache.hpp"

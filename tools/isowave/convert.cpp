@@ -115,7 +115,7 @@ void run_convert(const CLI::App &command, const ConvertArgs &options) {
     throw Error("{}: end the output's name in .zfp", options.output);
   if (is_zfp_name(options.path)) throw Error("{}: is compressed already", options.path);
   if (options.device && !options.compression.rate)
-    throw Error("--device compresses at a fixed rate only: leave it, or give --rate");
+    throw Error("--device compresses at a fixed rate only: leave it out, or give --rate");
   if (!options.compression.rate)
     refuse_options(command, {"--no-verify"}, "the error is measured except at a fixed --rate");
   const RawOverrides overrides = to_overrides(options.volume);

@@ -1,5 +1,5 @@
 #pragma once
-// What `render` and `verify` share: which frames of which volume are drawn.
+// Options that `render` and `verify` share: which frames of which volume are drawn.
 
 #include <CLI/CLI.hpp>
 #include <cstdint>
@@ -33,7 +33,7 @@ CLI::Option *add_frame_options(CLI::App &command, FrameOptions &options);
 /// "1280x720". Throws Error.
 ImageSize parse_size(const std::string &text);
 
-/// What is known of the frames before the volume is.
+/// The views, as far as they are known before the volume is.
 struct Views {
   std::optional<CameraFile> file;
   std::uint32_t count = 1;

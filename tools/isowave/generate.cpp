@@ -45,7 +45,7 @@ void check_space(const GenerateOptions &options, const std::filesystem::path &ou
                 space.available);
 }
 
-/// What a raw file's name does not say.
+/// The facts that a raw file's name does not state.
 std::string raw_options(const GenerateOptions &options, const std::filesystem::path &path) {
   if (path.extension() != ".raw" || parse_raw_name(path.stem().string())) return {};
   return fmt::format(" --dims {} {} {} --type {}", options.dims.x, options.dims.y, options.dims.z,

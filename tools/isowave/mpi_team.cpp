@@ -179,7 +179,7 @@ class HostWords {
     });
   }
 
-  /// Which part the words from `from` on are, of a process, or of kOthers.
+  /// Number of the part that the words of a process, or of kOthers, have from `from` on.
   std::atomic_ref<std::uint32_t> part_number(int rank, std::size_t from) const {
     return std::atomic_ref(
         part_numbers_[static_cast<std::size_t>(rank) * num_parts() + from / kPartWords]);

@@ -32,7 +32,7 @@ class MpiJob {
     return nullptr;
   }  // and compilers leave out what teams do
 #endif
-  /// Where and how this process was started: a checksum.
+  /// A checksum of the place and command line of this process.
   static std::string command_line();
   /// Number of this process among those of its host.
   static std::uint32_t local_rank();

@@ -1,6 +1,6 @@
 #pragma once
-// What every program of ours does around its own work: errors in one line, an output that fails is
-// one, options are strict.
+// The frame around each program's own work: errors in one line, a failing output is an error,
+// options are strict.
 
 #include <CLI/CLI.hpp>
 #include <functional>
@@ -20,7 +20,7 @@ int run_program(CLI::App &app, int argc, char **argv);
 /// say what failed, or to describe the options, one line on stderr says so, and the status is 1.
 int run_main(const std::function<int()> &work);
 
-/// What the program's exit status says.
+/// Exit status of the program.
 inline constexpr std::pair<int, const char *> kExitStatuses[] = {
     {0, "all is done"},
     {1, "wrong input, a failure (one line on standard error says which), or a check that failed"},

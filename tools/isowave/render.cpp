@@ -52,8 +52,7 @@ struct Drawing {
   std::unique_ptr<ocl::Device> device{};  ///< none with --reference
   std::optional<TeamVolume> bricks{};     ///< of several processes
   CompressedVolume whole{};               ///< of one process
-  Turns turns{};
-  std::unique_ptr<CoreImplementation> renderer{};
+  std::unique_ptr<isowave::Renderer::Implementation> renderer{};
   TeamRenderer *of_team = nullptr;            ///< in the renderer, if several processes draw
   const DeviceRenderer *on_device = nullptr;  ///< this process's, unless --reference draws
 
@@ -129,8 +128,8 @@ std::unique_ptr<Renderer> make_core_renderer(RenderArgs &options, Drawing &drawi
 
 void make_renderer(RenderArgs &options, Drawing &drawing) {
   const RendererOptions &wanted = options.renderer_flags.values;
-  drawing.renderer = std::make_unique<CoreImplementation>(
-      nullptr, drawing.volume(), drawing.turns,
+  drawing.renderer = std::make_unique<isowave::Renderer::Implementation>(
+      std::make_shared<Turns>(), drawing.volume(),
       add_choices(make_core_renderer(options, drawing),
                   {.with_bounds = wanted.with_bounds, .with_time_budget = wanted.with_kept_picture},
                   drawing.volume(), drawing.bricks ? drawing.bricks->rate : drawing.whole.rate()));

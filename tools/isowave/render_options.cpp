@@ -67,7 +67,7 @@ bool chooses_levels(const RenderArgs &options) {
 
 namespace {
 
-/// --max-surface-error, --time-budget and what goes with them.
+/// Checks --max-surface-error, --time-budget and the options that need them.
 void check_choice(const RenderArgs &options) {
   if (!options.max_surface_error && !options.error_map.empty())
     throw Error("--error-map needs --max-surface-error");
@@ -75,17 +75,17 @@ void check_choice(const RenderArgs &options) {
     throw Error("--refined needs --time-budget");
   if (!options.max_surface_error && !options.time_budget) return;
   const char *choice = options.max_surface_error ? "--max-surface-error" : "--time-budget";
-  if (options.reference) throw Error("--reference cannot choose: leave out {}", choice);
+  if (options.reference) throw Error("--reference draws every frame in full: leave out {}", choice);
   if (options.time_budget) check_time_budget(*options.time_budget);
   if (options.time_budget && !options.progress_dir.empty())
     throw Error("--time-budget draws a frame in steps: leave out --progress-dir");
   if (!options.max_surface_error) return;
   check_max_surface_error(*options.max_surface_error);
   if (options.time_budget)
-    throw Error("--max-surface-error takes the time it takes: leave out --time-budget");
+    throw Error("--max-surface-error cannot keep a time: leave out --time-budget");
   if (options.frame.voxel_error > 0 || options.voxel_pixels > 0)
     throw Error(
-        "--max-surface-error chooses for itself: leave out --voxel-error and --voxel-pixels");
+        "--max-surface-error chooses the detail: leave out --voxel-error and --voxel-pixels");
 }
 
 }  // namespace
@@ -178,59 +178,60 @@ void add_render_options(CLI::App &command, RenderArgs &options) {
   add_frame_options(command, options.frame)->required();
   command
       .add_option("--samples", options.frame.samples,
-                  "N: a pixel is the mean of N x N rays; pixels elsewhere in this list are still "
-                  "the picture's")
+                  "N x N rays per pixel, whose mean colour it gets; other options still count the "
+                  "picture's pixels")
       ->check(CLI::Range(1u, ImageSize::kMaxSamples))
       ->capture_default_str();
   command.add_option("--device", options.device,
                      "device: index, cpu, gpu, or a part of its name (see `isowave devices`); "
-                     "several, with commas: of the first process of a host, the second, ...");
+                     "several, with commas: for the first process of a host, the second, ...");
   command.add_option("--bricks", options.bricks,
                      "how to cut the volume, one brick per process: XxYxZ bricks along each axis, "
                      "or active to give each brick the same number of surface blocks [bricks of "
                      "equal size]");
   command.add_flag("--parallel", options.parallel,
-                   "draw all views in parallel (orthographic) projection: what is as far away as "
-                   "the point that a camera looks at keeps its size");
+                   "draw all views in parallel (orthographic) projection; the point that a camera "
+                   "looks at keeps its scale");
   command.add_option("--color", options.color, "surface colour #RRGGBB")->capture_default_str();
   command.add_option("--background", options.background, "background colour #RRGGBB")
       ->capture_default_str();
   add_normals_option(command, options.normals);
   add_ambient_option(command, options.ambient_rays);
   command.add_option("--output,-o", options.image,
-                     "PNG; NAME_isoV_viewK.png when there are several frames [VOLUME_isoV.png in "
-                     "the current folder, where no other output is asked for]");
+                     "PNG of the picture; NAME_isoV_viewK.png if there are several frames "
+                     "[VOLUME_isoV.png in the current folder, if no other output is asked for]");
   command.add_option("--depth", options.depth,
-                     "float32 .npy [H,W]: distance from the eye, inf where nothing is hit; with "
-                     "--samples of each ray");
+                     "float32 .npy [H,W]: distance from the eye, inf if nothing is hit; with "
+                     "--samples for each ray");
   command.add_option(
       "--max-surface-error", options.max_surface_error,
-      "choose levels of detail and bit planes for each frame, so that its surface is within so "
-      "many pixels of the true one, and say for how many pixels that is certain");
+      "largest distance to the surface of the uncompressed volume [pixels]: levels of detail and "
+      "bit planes are chosen so that most pixels keep it, and the share of certain pixels is "
+      "printed");
   command.add_option(
       "--error-map", options.error_map,
-      "float32 .npy [H,W] of --max-surface-error: the bound of each pixel, or ray, inf "
-      "where there is none");
+      "float32 .npy [H,W] for --max-surface-error: the bound of each pixel, or ray; inf: there "
+      "is none");
   command.add_option(
       "--time-budget", options.time_budget,
-      "ms for each frame: draws small pictures by coarse levels of detail first, then larger ones, "
-      "as long as there is time");
+      "time for each frame [ms]: draws small pictures by coarse levels of detail first, then "
+      "larger ones, as long as there is time");
   command.add_option("--refined", options.refined,
-                     "PNG of --time-budget: the whole picture, drawn after the other");
-  command.add_option("--stats", options.stats, "JSON statistics of every frame and pass");
+                     "PNG for --time-budget: the whole picture, drawn afterwards");
+  command.add_option("--stats", options.stats, "file for JSON statistics of every frame and pass");
   command.add_flag(
       "--no-stage-times", options.no_stage_times,
-      "leave ms per stage out of --stats: measuring them makes the host wait after each pass");
+      "leave ms per stage out of --stats, since the host waits after each pass to measure them");
   command.add_flag("--verbose", options.verbose, "print the plan of the device's memory");
   command.add_option("--progress-dir", options.progress_dir,
-                     "folder for the picture after every pass");
+                     "folder for pictures, one after every pass");
   add_renderer_options(command, options.renderer_flags);
   command.add_flag(
       "--reference", options.reference,
-      "use the scalar C++ reference instead of a device; options of how a device draws are "
-      "then without effect");
+      "use the scalar C++ reference instead of a device; options that say how a device draws "
+      "then have no effect");
   command.get_option("--orbit")->description(
-      "draw N views around the whole volume [one, which the surfaces fill]");
+      "number of views around the whole volume [one view, which the surfaces fill]");
   group_render_options(command);
 }
 

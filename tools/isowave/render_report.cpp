@@ -53,11 +53,9 @@ nlohmann::ordered_json report_error(double max_surface_error, const CompressedVo
                                : 100.0 * double(summary.num_certified) / double(summary.num_pixels);
   fmt::print(
       "  within {} pixels of the true surface{}: {:.2f} % of {} rays (bound: median {:.3g}, p99 "
-      "{:.3g}); {} "
-      "uncertain\n"
+      "{:.3g}); {} uncertain\n"
       "  with voxels up to {:.3g} pixels apart and values up to {} off; chosen in {:.0f} ms, "
-      "bounded in "
-      "{:.0f} ms\n",
+      "bounded in {:.0f} ms\n",
       max_surface_error,
       volume.errors_are_stated ? ", if the errors are right that the file states" : "", certified,
       with_commas(summary.num_pixels), summary.median, summary.p99,

@@ -14,45 +14,41 @@ void add_renderer_options(CLI::App &app, RendererFlags &flags) {
       ->type_name("BYTES");
   app.add_option(
          "--cache-slots", flags.values.cache_slots,
-         "decoded blocks kept on the device, 8 to 2^26 [as many as the budget allows; without one "
-         "as many as frames need, growing to 2^20]")
+         "number of decoded blocks kept on the device, 8 to 2^26 [with a budget as many as it "
+         "allows, without one as many as frames need, growing to 2^20]")
       ->check(CLI::Range(8u, 1u << 26));
   app.add_option("--stream", flags.stream,
-                 "where the compressed volume is: device, host (blocks are uploaded when they are "
-                 "asked for), or "
-                 "auto (on the device if that leaves room for a useful cache)")
+                 "place of the compressed volume: device, host (blocks are uploaded on request), "
+                 "or auto (the device, if that leaves room for a useful cache)")
       ->check(CLI::IsMember({"auto", "device", "host"}))
       ->capture_default_str();
   app.add_option("--voxel-pixels", flags.voxel_pixels,
-                 "draw far parts by coarser levels of detail, whose voxels are at most so many "
-                 "pixels apart; "
-                 "0: all by the finest")
+                 "largest distance between voxels of a coarser level of detail [pixels], which "
+                 "then draws far parts; 0: the finest level draws all")
       ->capture_default_str();
   app.add_option("--pipeline", flags.pipeline,
                  "arrangement of the passes: blocks (the paper's), rays, or auto (rays, which was "
-                 "faster in "
-                 "nearly all "
-                 "that was measured)")
+                 "faster in nearly all measurements)")
       ->check(CLI::IsMember({"auto", "blocks", "rays"}))
       ->capture_default_str();
   app.add_option(
          "--speculation", flags.speculation,
          "blocks a ray looks ahead: off (1), global (W*H / active rays), per-ray (twice as many "
          "after every miss; in pipeline blocks no more than global), scanned (pipeline blocks: "
-         "global, and what rays leave goes to others), or auto: per-ray in pipeline rays, global "
-         "in blocks")
+         "global, and places that rays leave empty go to others), or auto (per-ray in pipeline "
+         "rays, global in blocks)")
       ->check(CLI::IsMember({"auto", "off", "global", "per-ray", "scanned"}))
       ->capture_default_str();
   app.add_option("--max-speculation", flags.values.max_speculation,
-                 "most blocks a ray looks ahead, 1..64")
+                 "most blocks that a ray looks ahead, 1..64")
       ->capture_default_str();
   app.add_option("--solver", flags.solver, "root finder: linear, marmitt, analytic or bernstein")
       ->capture_default_str();
   app.add_option("--grouping", flags.grouping,
-                 "how pipeline blocks gathers rays by block: radix or counting")
+                 "way in which pipeline blocks groups rays by block: radix or counting")
       ->capture_default_str();
   app.add_option("--closest", flags.closest,
-                 "how pipeline blocks finds a ray's closest result: scan or atomic-min")
+                 "way in which pipeline blocks finds a ray's closest result: scan or atomic-min")
       ->capture_default_str();
   app.add_option("--group-size", flags.values.group_size, "work-items per work-group, 8..256")
       ->capture_default_str();
@@ -60,7 +56,7 @@ void add_renderer_options(CLI::App &app, RendererFlags &flags) {
 
 void add_normals_option(CLI::App &app, std::string &normals) {
   app.add_option("--normals", normals,
-                 "what surfaces are lit by: smooth (central differences of voxels) or cell (the "
+                 "normals that light surfaces: smooth (central differences of voxels) or cell (the "
                  "gradient of each trilinear cell, which shows as facets)")
       ->check(CLI::IsMember({"smooth", "cell"}))
       ->capture_default_str();
@@ -68,8 +64,9 @@ void add_normals_option(CLI::App &app, std::string &normals) {
 
 void add_ambient_option(CLI::App &app, std::uint32_t &num_rays) {
   app.add_option("--ambient", num_rays,
-                 "N rays of each hit, up to 255, that find out how much of the sky it sees: shows "
-                 "depth; each takes about as long as the frame without; 16 and more look smooth")
+                 "rays from each hit, up to 255, that find out how much of the sky it sees, which "
+                 "shows depth; each takes about as long as a frame without any; 16 and more look "
+                 "smooth")
       ->type_name("N")
       ->capture_default_str();
 }
@@ -96,8 +93,8 @@ RendererOptions to_renderer_options(const RendererFlags &flags, ImageSize size) 
                                 .scanned_pairs = flags.speculation == "scanned"};
   if (is_blocks) options.pipeline = blocks_pipeline(of_blocks);
   if (flags.speculation == "off") options.max_speculation = 1;
-  // Measured: pipeline blocks needs twice the passes with it, and is no faster for decoding less
-  // (bench/h100.md).
+  // Pipeline blocks needs twice the passes with per-ray speculation, and is no faster although it
+  // decodes less (bench/h100.md).
   options.per_ray_speculation =
       flags.speculation == "per-ray" || (flags.speculation == "auto" && !is_blocks);
   options.solver = solver_from_string(flags.solver);

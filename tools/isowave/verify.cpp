@@ -111,7 +111,7 @@ std::uint64_t verify_solver(const VerifyArgs &options, std::string_view name, oc
   return failures;
 }
 
-/// What can be told from the options alone.
+/// Checks that need only the options.
 void check_options(const CLI::App &command, const VerifyArgs &options) {
   for (const std::string &name : options.solvers) solver_from_string(name);
   if (options.frames.input.empty()) {

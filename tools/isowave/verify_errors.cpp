@@ -22,9 +22,8 @@ std::uint64_t verify_errors(const VerifyFramesOptions &options, nlohmann::ordere
                 options.input);
   if (!options.oracles.empty() || options.frame.voxel_error > 0)
     throw Error(
-        "--max-surface-error chooses for itself, and has an oracle of its own: leave out --oracle "
-        "and "
-        "--voxel-error");
+        "--max-surface-error chooses the detail, and has an oracle of its own: leave out --oracle "
+        "and --voxel-error");
   FrameOptions frame_options = options.frame;
   frame_options.compression.levels = 0;
   frame_options.compression.measure_error = true;

@@ -94,7 +94,7 @@ Drawer make_drawer(const Scene &scene, const std::string &device, Solver solver)
   return drawer;
 }
 
-/// What the rows and the JSON entries of a run add up to.
+/// Sums of the rows and the JSON entries of a run.
 struct Totals {
   std::uint64_t failures = 0, judged = 0;
 };

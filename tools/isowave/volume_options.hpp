@@ -1,6 +1,6 @@
 #pragma once
-// What the subcommands share about volumes: options that say what a raw file's name does not,
-// opening any kind of volume, and the progress bar.
+// Code that the subcommands share about volumes: options, opening any kind of volume, and the
+// progress bar.
 
 #include <CLI/CLI.hpp>
 #include <cstdint>

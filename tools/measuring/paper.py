@@ -17,7 +17,7 @@ class Article:
     visible, utilisation  means [percent]: of all blocks, of pixels
     memory, cache   MB of 1000^2 bytes: of BCMC (None: it failed), of the raycaster
     rate            bits a voxel, if known: the file of Richtmyer-Meshkov is called .crate1
-    total_ms        of a frame, where given
+    total_ms        of a frame, if given
     """
 
     dims: str
@@ -91,7 +91,7 @@ STAND_INS = {
 
 
 def rate_of(data_set):
-    """Bits a voxel that a data set is compressed with: the article's, 4 where that is not known."""
+    """Bits a voxel that a data set is compressed with: the article's, or 4 if unknown."""
     return (data_set in ARTICLE and ARTICLE[data_set].rate) or 4
 
 
@@ -128,7 +128,7 @@ def paper(run):
         fields = run.fields()[:1]
     for field in fields:
         name, seconds = make(run, field, rate_of(STAND_INS.get(field)))
-        # 20 to 235 of 255: where the synthetic volumes have surfaces
+        # 20 to 235 of 255: the synthetic volumes have surfaces there
         row = measure(run, field, name, {}, (20, 235), options)
         rows.append({**row, "stands_for": STAND_INS.get(field, ""), "made_s": seconds})
     for path, isovalues in run.every_volume():

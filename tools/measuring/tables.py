@@ -9,7 +9,7 @@ from measuring.cells import mebibytes, ms, name_of, percent
 
 
 def option(row, name):
-    """The value of an option among the row's arguments; None where it is not given."""
+    """The value of an option among the row's arguments; None if it is not given."""
     arguments = row["arguments"]
     return arguments[arguments.index(name) + 1] if name in arguments else None
 

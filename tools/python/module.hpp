@@ -1,5 +1,5 @@
 #pragma once
-// What the parts of the module isowave._core share: the GIL, and how Python ends.
+// Code that the parts of the module isowave._core share: the GIL, and how Python ends.
 //
 // The GIL is released wherever the library works. What waits for a device's lock must not hold the
 // GIL, since the thread that has the lock may wait for the GIL to report a pass; that goes for
@@ -270,7 +270,7 @@ class Callbacks {
   std::exception_ptr raised_;
 };
 
-/// What ends the library's work after a callback has raised something.
+/// The exception that ends the library's work after a callback has raised something.
 struct Stopped {};
 
 /// Destroys T without the GIL.

@@ -32,7 +32,7 @@ nb::tuple camera_tuple(const isowave::Camera &camera) {
 
 /// The picture so far; only while the callback that got it is at work. Threads take turns.
 class PassView {
-  /// Who has the lock never waits for the GIL.
+  /// A thread with the lock never waits for the GIL.
   template <class Look>
   auto look(const Look &at) const {
     const WithoutGil no_gil;

@@ -15,39 +15,39 @@
 
 namespace isowave {
 
-/// What is drawn: the volume, or the field that is nowhere above, or nowhere below what its voxels
-/// were before compression.
+/// The field that is drawn: the volume's, or one that is nowhere above (kLower) or nowhere below
+/// (kUpper) the voxels before compression.
 enum class FieldBound { kNone, kLower, kUpper };
 
-/// Which gradient of the field hits have, and so which normals.
+/// The gradients that hits have. Normals follow from them.
 enum class Normals {
   kSmooth,  ///< central differences, trilinear between voxels
-  kCell     ///< of the trilinear field itself, which jumps from cell to cell
+  kCell     ///< gradients of the trilinear field itself, which jump from cell to cell
 };
 
-/// In world space: origin + t direction, t from 0 on.
+/// A ray in world space: origin + t direction, t from 0 on.
 struct Ray {
   Vector3 origin, direction;
 };
 
-/// Colours are sRGB, 0 to 1.
+/// Colours and lights. Colours are sRGB, 0 to 1.
 struct Appearance {
   std::array<float, 3> surface{219 / 255.0f, 189 / 255.0f, 135 / 255.0f};
   std::array<float, 3> background{1, 1, 1};
   float ambient = 0.15f;                  ///< light from all around
-  float diffuse = 0.5f, specular = 0.2f;  ///< of a headlight at the eye
-  float above = 0.45f;  ///< of a light halfway between the eye and the picture's upper edge
+  float diffuse = 0.5f, specular = 0.2f;  ///< light of a headlight at the eye
+  float above = 0.45f;  ///< light from halfway between the eye and the picture's upper edge
 };
 
-/// The picture so far, for FrameRequest::on_pass, and only until that returns. Several threads may
-/// look at it: they take turns.
+/// The picture so far, for FrameRequest::on_pass, and only until on_pass returns. Several threads
+/// may use it: they take turns.
 ///
-/// Throws  Error: another thread asks after on_pass has returned, while the frame is drawn
+/// Throws  Error: another thread calls after on_pass has returned, while the frame is drawn
 class Progress {
  public:
   virtual ~Progress() = default;
   virtual std::uint32_t passes() const = 0;
-  virtual double completed_percent() const = 0;  ///< rays that have ended, of all
+  virtual double completed_percent() const = 0;  ///< percentage of rays that have ended
   /// Size of picture(): the frame's, except that the first pictures within a time budget are
   /// smaller.
   virtual ImageSize size() const = 0;
@@ -55,54 +55,56 @@ class Progress {
   virtual std::vector<std::uint8_t> picture() const = 0;
 };
 
-/// One frame: what to draw, how precisely, and what is wanted of it. Rendering the same request
-/// again gives the same bits, whatever was drawn before, unless there is a time budget.
+/// One frame: what to draw, how precisely, and which arrays to return. Rendering the same request
+/// again gives the same bits, unless there is a time budget.
 struct FrameRequest {
   Camera camera{};
-  /// The surface separates voxels below it from the others. Voxels are float32: of a lossless
-  /// volume, each is compared as if in double; of any other, with the nearest float32.
+  /// The surface separates voxels below the isovalue from the others. Voxels are float32. If the
+  /// volume is lossless, they are compared as if in double, otherwise with the nearest float32.
   double isovalue = 0;
   ImageSize size{};
   Appearance appearance{};
 
-  /// Voxels of a coarser level of detail may be so many pixels apart; 0: the finest level draws
-  /// all. Needs RendererOptions::with_levels.
+  /// Largest distance between voxels of a coarser level of detail [pixels]; 0: the finest level
+  /// draws all. Needs RendererOptions::with_levels.
   double voxel_pixels = 0;
-  /// Decoded voxels may be off by so much from the compressed ones; 0: not at all [voxel values].
+  /// Largest difference of decoded voxels from the compressed ones [voxel values].
   double voxel_error = 0;
   FieldBound bound = FieldBound::kNone;  ///< needs RendererOptions::with_bounds
-  Normals normals = Normals::kSmooth;    ///< nothing but the hits' gradients depends on them
-  /// Rays of each hit, up to 255, that find out how much of the sky it sees: pictures show depth.
-  /// Each takes about as long as the frame without. Needs with_rays.
+  Normals normals = Normals::kSmooth;    ///< gradients of the hits; nothing else depends on them
+  /// Rays from each hit, up to 255, that find out how much of the sky it sees, which shows depth.
+  /// Each takes about as long as a frame without any. Needs with_rays.
   std::uint32_t ambient_rays = 0;
-  /// Instead: chooses voxel_pixels and voxel_error such that most pixels are within so many pixels
-  /// of the true surface, that of the volume before compression. Needs with_bounds.
+  /// Largest distance to the surface of the volume before compression [pixels]. voxel_pixels and
+  /// voxel_error are then chosen so that most pixels keep it. Needs with_bounds.
   std::optional<double> max_surface_error{};
-  /// Draws what can be drawn in this time: small pictures first. Needs with_time_budget.
+  /// Time in which the largest picture possible is drawn, small pictures first. Needs
+  /// with_time_budget.
   std::optional<double> time_budget_ms{};
 
-  // What the frame brings to the host.
+  // Arrays that the frame brings to the host.
   bool want_picture = true;
   bool want_depth = false, want_normals = false, want_positions = false, want_hits = false;
-  bool want_bounds = false;  ///< of the error of each pixel; needs RendererOptions::with_bounds
+  bool want_bounds = false;  ///< bounds of each pixel's error; needs RendererOptions::with_bounds
 
-  /// Called after each pass, those for smooth normals and ambient rays included; on the host after
-  /// each band of rows, from the top. Return false to stop; the frame is the picture so far. In a
-  /// team, all processes have one or none, which return the same and ask for pictures alike.
+  /// Called after each pass, also those for smooth normals and ambient rays; on the host after each
+  /// band of rows, from the top. If it returns false, the frame stops with the picture so far. In a
+  /// team, all processes have an on_pass or none; they return the same, and get the same pictures.
   std::function<bool(const Progress &)> on_pass{};
 };
 
-/// Where a ray first crosses the isosurface. The true crossing of the decoded field, not a sample.
+/// First crossing of a ray with the isosurface: the true crossing of the decoded field, not a
+/// sample.
 struct Hit {
   float t = std::numeric_limits<float>::infinity();  ///< distance from the eye [world units]
-  std::uint32_t level = 0;                           ///< of detail; 0: the finest
-  std::array<std::uint32_t, 3> cell{};  ///< voxel at its lowest corner: it ends one further
-  std::array<float, 3> position{};      ///< in the cell, 0 to 1
-  std::array<float, 3> gradient{};      ///< FrameRequest::normals [voxel value per voxel]
+  std::uint32_t level = 0;                           ///< level of detail; 0: the finest
+  std::array<std::uint32_t, 3> cell{};               ///< voxel at the cell's lowest corner
+  std::array<float, 3> position{};                   ///< place in the cell, 0 to 1
+  std::array<float, 3> gradient{};  ///< as FrameRequest::normals [voxel value per voxel]
 };
 
-/// Calls visit(name, field) for each field that a request consists of, those of its camera and
-/// appearance included, except on_pass. The names are those of isowave's Python package.
+/// Calls visit(name, field) for each field of a request, its camera and its appearance, except
+/// on_pass. The names are those of isowave's Python package.
 ///
 /// request  a FrameRequest, or a const one
 template <class Request, class Visit>
@@ -140,56 +142,56 @@ void for_each_field(Request &request, const Visit &visit) {
 struct FrameStatistics {
   std::uint32_t passes = 0;
   std::uint64_t rays = 0, hits = 0;
-  std::uint64_t decoded_blocks = 0;               ///< of 4^3 voxels, all
-  std::uint32_t normals_passes = 0;               ///< of these, for smooth normals
-  std::uint64_t normals_decoded_blocks = 0;       ///< of these, for smooth normals
-  double normals_ms = 0;                          ///< of total_ms
-  std::uint32_t ambient_passes = 0;               ///< of these, for ambient rays
-  double ambient_ms = 0;                          ///< of total_ms
-  std::uint64_t uploaded_bytes = 0;               ///< of a compressed volume that stays on the host
-  std::uint32_t first_level = 0, last_level = 0;  ///< of detail, that drew; 0: the finest
+  std::uint64_t decoded_blocks = 0;               ///< all decoded blocks of 4^3 voxels
+  std::uint32_t normals_passes = 0;               ///< those of `passes` for smooth normals
+  std::uint64_t normals_decoded_blocks = 0;       ///< those of decoded_blocks for smooth normals
+  double normals_ms = 0;                          ///< part of total_ms
+  std::uint32_t ambient_passes = 0;               ///< those of `passes` for ambient rays
+  double ambient_ms = 0;                          ///< part of total_ms
+  std::uint64_t uploaded_bytes = 0;               ///< from a compressed volume on the host
+  std::uint32_t first_level = 0, last_level = 0;  ///< levels of detail that drew; 0: the finest
   double total_ms = 0;     ///< wall clock, from camera to finished hits on the device
-  bool cancelled = false;  ///< by on_pass
+  bool cancelled = false;  ///< on_pass stopped the frame
   bool complete = true;    ///< false: cancelled, or the time was over
-  /// Volume::errors_are_stated() of what was drawn: Frame::bounds rest on these errors.
+  /// Volume::errors_are_stated() of the volume: Frame::bounds rest on its errors.
   bool errors_are_stated = false;
-  std::map<std::string, double> stage_ms{};  ///< of a device with profiling
+  std::map<std::string, double> stage_ms{};  ///< by stage, if the device has profiling
 };
 
-/// What was chosen to keep FrameRequest::max_surface_error.
+/// The detail that was chosen to keep FrameRequest::max_surface_error.
 struct DetailChoice {
   double voxel_pixels = 0, voxel_error = 0;
-  bool reachable = true;  ///< false: not with this volume; full detail was drawn
-  std::string advice{};   ///< what would help, where it is not reachable
+  bool reachable = true;  ///< false: this volume cannot keep it; full detail was drawn
+  std::string advice{};   ///< what would help if it is not reachable
 };
 
 /// A finished frame. Arrays that were not asked for are empty. Rays are [rows][columns], row 0 at
 /// the top: size.samples times as many as pixels along each axis.
 struct Frame {
   ImageSize size{};
-  std::uint32_t rows = 0, columns = 0;  ///< of rays
+  std::uint32_t rows = 0, columns = 0;  ///< numbers of rays
 
   std::vector<std::uint8_t> picture{};          ///< RGB [height][width][3]
   std::vector<float> depth{};                   ///< [rows][columns] world units; infinity: no hit
   std::vector<std::array<float, 3>> normals{};  ///< [rows][columns] world space, of length 1, away
                                                 ///< from larger values; 0 0 0: no hit
-  /// [rows][columns] of the hits, world space, rounded if Volume::float32_positions(); NaN: no hit
+  /// [rows][columns] hits in world space, rounded if Volume::float32_positions(); NaN: no hit
   std::vector<Vector3> positions{};
   std::vector<Hit> hits{};  ///< [rows][columns]
-  /// [rows][columns] how far the surface may be from the true one along the ray, at most [pixels];
-  /// infinity: nothing is certain. They hold if the volume's errors do: see
+  /// [rows][columns] Largest possible distance to the true surface along the ray [pixels];
+  /// infinity: nothing is certain. Bounds hold if the volume's errors do: see
   /// FrameStatistics::errors_are_stated.
   std::vector<float> bounds{};
 
   FrameStatistics statistics{};
-  std::optional<DetailChoice> detail{};  ///< where max_surface_error was given
+  std::optional<DetailChoice> detail{};  ///< if max_surface_error was given
 };
 
 /// Writes frame.picture: RGB, or RGBA if a caller has added an alpha to its pixels.
 ///
-/// Throws  Error: no picture, a name that ends in something else than .png, or it cannot be written
+/// Throws  Error: no picture, a name that does not end in .png, a file that cannot be written
 void save_png(const Frame &frame, const std::filesystem::path &path);
-/// The bytes of such a file.
+/// The bytes that save_png() writes.
 ///
 /// Throws  Error: no picture
 std::vector<std::uint8_t> encode_png(const Frame &frame);

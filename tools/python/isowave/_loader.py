@@ -1,12 +1,12 @@
 """Lets the compiled part find OpenCL: a loader, and drivers that no administrator registered.
 
-What is installed comes first. Only what is missing is added, and only for this process:
+Installed parts come first. Only missing parts are added, and only for this process:
 
 - libOpenCL.so.1 of the system, else the one that the wheel has;
-- PoCL from PyPI (`pip install isowave[cpu]`), where the system has no PoCL, and has a linker;
-- NVIDIA's driver by its name, where it is there and not registered, as in many GPU containers.
+- PoCL from PyPI (`pip install isowave[cpu]`), if the system has a linker and no PoCL;
+- NVIDIA's driver by its name, if it is there and not registered, as in many GPU containers.
 
-OCL_ICD_VENDORS and OCL_ICD_FILENAMES, if they are set, are the user's word, and nothing is added.
+If OCL_ICD_VENDORS or OCL_ICD_FILENAMES is set, the user has decided, and nothing is added.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def pip_pocl() -> pathlib.Path | None:
 def can_link(usr: pathlib.Path = pathlib.Path("/usr")) -> bool:
     """Whether PoCL from PyPI can link the kernels that it compiles.
 
-    It takes `ld`, libgcc and libc's development files, and ends the process without.
+    It needs `ld`, libgcc and libc's development files, and ends the process without them.
     """
     path = os.pathsep.join((os.environ.get("PATH", ""), str(usr / "bin")))
     libgcc, libc = "lib*/gcc*/*/*/crtbeginS.o", ("lib*/crti.o", "lib/*/crti.o")
@@ -76,7 +76,7 @@ def registered(vendors: pathlib.Path) -> dict[str, str]:
 
 
 def unregistered(drivers: dict[str, str]) -> dict[str, str]:
-    """What is on this machine and not among the registered drivers."""
+    """Drivers of this machine that are not registered."""
     added = {}
     if not any("nvidia" in driver for driver in drivers.values()) and load_library(NVIDIA_DRIVER):
         added["isowave_nvidia.icd"] = NVIDIA_DRIVER
@@ -90,7 +90,7 @@ def unregistered(drivers: dict[str, str]) -> dict[str, str]:
 
 
 def trusted_users() -> set[int]:
-    """This user and root, also in a container that maps this user alone and shows root as 65534."""
+    """This user and root, also in a container that maps only this user and shows root as 65534."""
     try:
         with open("/proc/self/uid_map", encoding="ascii") as file:
             mapped = [int(line.split()[0]) for line in file]
@@ -100,7 +100,7 @@ def trusted_users() -> set[int]:
 
 
 def is_private(folder: pathlib.Path) -> bool:
-    """Whether no other user can change what is in the folder, nor what leads there.
+    """Whether no other user can change the folder's contents, or the way to it.
 
     core/platform/private_folder.cpp has the same rules; it cannot be called before there is OpenCL.
     """
@@ -180,7 +180,7 @@ def write_registrations(folder: pathlib.Path, drivers: dict[str, str]) -> None:
 
 
 def prepare() -> None:
-    """Call before the compiled part is loaded. Raises ImportError where there is no loader."""
+    """Call before the compiled part is loaded. Raises ImportError if there is no loader."""
     if load_library(LOADER):
         found["loader"] = LOADER
     elif BUNDLED_LOADER.exists() and load_library(str(BUNDLED_LOADER)):

@@ -1,4 +1,4 @@
-"""The one door for arrays: whatever holds a volume comes in through as_source().
+"""Reads arrays of all packages: every object with a volume comes in through as_source().
 
     array -> adapter of its package -> Found -> as_source() -> ArraySource -> the compressor
              memory, stores,           what     checks the
@@ -8,7 +8,7 @@
 |---|---|
 | source | as_source(), ArraySource, which class has which adapter |
 | memory, stores, labelled, images, nifti | the adapters |
-| found | what an adapter says |
+| found | an adapter's description of an array |
 | grid | spacing, origin, direction; the rules of core/volume |
 | voxels | stored types -> types that isowave reads |
 | layers | chunk rows, each read once |

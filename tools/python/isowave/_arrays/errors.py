@@ -1,4 +1,4 @@
-"""Errors of arrays that cannot be read: one line each. It says what, where and what would help."""
+"""Errors of arrays that cannot be read: one line each, which says what is wrong and what helps."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ class ArrayValueError(ValueError):
 
 
 class ArrayTypeError(TypeError):
-    """The object, or its type of voxels, is none that can be read."""
+    """The object, or its type of voxels, cannot be read."""
 
 
 def one_line(text: object) -> str:
-    """Returns the text with every run of white space as one blank, cut where it gets too long."""
+    """Returns the text with every run of white space as one blank, cut if it is too long."""
     try:
         line = " ".join(str(text).split())
     except Exception:  # an object whose text raises must still give a message

@@ -1,7 +1,7 @@
-"""What an adapter finds out about an object, and how adapters look at objects of other packages.
+"""An adapter's description of an object, and how adapters look at objects of other packages.
 
-An adapter imports nothing. An object's own methods and sys.modules, where its package already is,
-are all that it needs.
+An adapter imports nothing. It needs only an object's own methods and sys.modules, which has the
+object's package already.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ Adapter = Callable[[Any, bool], Found]
 
 
 def named(obj: Any) -> str:
-    """Returns the class of an object and its name, where it has one: "h5py.Dataset '/ct'"."""
+    """Returns the class of an object and its name, if it has one: "h5py.Dataset '/ct'"."""
     name = getattr(obj, "name", None)
     return f"{type_name(obj)} {short(name)}" if isinstance(name, str) and name else type_name(obj)
 

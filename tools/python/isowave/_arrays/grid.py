@@ -1,4 +1,4 @@
-"""Where the voxels of an array lie in the world, and which grids are accepted.
+"""Places of an array's voxels in the world, and the grids that are accepted.
 
 World = origin + direction * (spacing * index). Vectors in world space and index vectors beside
 them are (x, y, z) here, as in ITK and VTK; what an ArraySource shows is (z, y, x). All of it is
@@ -36,7 +36,7 @@ IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 @dataclass(frozen=True)
 class Placement:
-    """Where a grid lies: spacing in world units (x, y, z), origin (x, y, z), direction by rows."""
+    """Place of a grid: spacing in world units (x, y, z), origin (x, y, z), direction by rows."""
 
     spacing: Vector = (1.0, 1.0, 1.0)
     origin: Vector = (0.0, 0.0, 0.0)
@@ -105,7 +105,7 @@ def columns(rows: Matrix) -> Matrix:
 
 
 def determinant(rows: Matrix) -> float:
-    """Returns the determinant; NaN or infinite where it overflows."""
+    """Returns the determinant; NaN or infinite if it overflows."""
     (a, b, c), (d, e, f), (g, h, i) = rows
     return a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
 
@@ -215,8 +215,8 @@ def _advice_on_axes(sizes: tuple[int, ...]) -> str:
 def checked_direction(values: Any, what: str) -> Matrix:
     """Returns a direction that a caller gave: 3 x 3, columns of length 1.
 
-    Raises ArrayValueError where a column has another length, as that of an affine has, which
-    holds the spacing, too.
+    Raises ArrayValueError if a column has another length, as the columns of an affine have, which
+    hold the spacing, too.
     """
     rows = matrix(values, what)
     for axis, column in zip("xyz", columns(rows)):

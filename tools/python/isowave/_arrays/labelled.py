@@ -43,8 +43,8 @@ def xarray_dataarray(array: Any, has_spacing: bool) -> Found:
     gives spacing and origin; a falling one a direction of -1, so that every voxel stays where its
     coordinates say. Without a coordinate: spacing 1, origin 0.
 
-    The attribute _FillValue, or missing_value, names voxels without data; xarray has replaced them
-    by NaN where it decoded the file, and rioxarray's nodata is the same attribute.
+    The attribute _FillValue, or missing_value, names voxels without data. If xarray has decoded the
+    file, it has replaced them by NaN. rioxarray's nodata is the same attribute.
 
     Raises ArrayValueError for two dims of one axis, and for a coordinate that is not of numbers,
     not even or not moving, unless the caller gave a spacing; then such a coordinate is ignored.

@@ -27,10 +27,10 @@ class LayerReader:
     fetch       reads layers of the store
     shape       (nz, ny, nx)
     stored      type of the store's voxels
-    dtype       type of what is returned: read_type() of it, or type_with_nan() of that
+    dtype       type of returned voxels: read_type() of `stored`, or type_with_nan() of that
     row_edges   layers at which chunk rows begin: 0 first, then ascending, all below nz. None
-                where any layers are as cheap as any others (memory, files without chunks)
-    fill_value  of masked voxels, a number of dtype; None: they are refused
+                if all layers are equally cheap to read (memory, files without chunks)
+    fill_value  value for masked voxels, a number of dtype; None: they are refused
     what        names the array in messages
 
     Holds at most one chunk row, and beside it the slab that is being put together.
@@ -58,7 +58,7 @@ class LayerReader:
         self._row_end = 0
 
     def read(self, z_begin: int, z_end: int) -> NDArray[Any]:
-        """Returns layers [z_begin, z_end), C-contiguous; a view where memory has them so.
+        """Returns layers [z_begin, z_end), C-contiguous; a view if memory has them so.
 
         Raises ArrayValueError if the store gives layers of another shape or type than it promised.
         """
@@ -136,7 +136,7 @@ class LayerReader:
 def even_rows(chunk_layers: int, num_layers: int, first: int = 0) -> Sequence[int]:
     """Returns the edges of chunk rows of chunk_layers each; the first row may be shorter.
 
-    first  the first edge after layer 0, or 0 where a whole row begins there
+    first  the first edge after layer 0, or 0 if a whole row begins there
     """
     if first == 0:
         return range(0, num_layers, chunk_layers)
@@ -144,7 +144,7 @@ def even_rows(chunk_layers: int, num_layers: int, first: int = 0) -> Sequence[in
 
 
 def most_layers(row_edges: Sequence[int] | None, num_layers: int) -> int:
-    """Returns the layers of the largest chunk row; 1 where there are no rows."""
+    """Returns the layers of the largest chunk row; 1 if there are no rows."""
     if row_edges is None:
         return 1
     if isinstance(row_edges, range):

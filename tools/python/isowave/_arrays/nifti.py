@@ -89,7 +89,7 @@ def _to_lps(placement: Placement, unit: float) -> Placement:
 
 
 def _length_unit(header: Any, what: str) -> float:
-    """Returns the millimetres in the unit of lengths; 1 where the header names none."""
+    """Returns the millimetres in the unit of lengths; 1 if the header names none."""
     keys = getattr(header, "keys", None)
     if not callable(keys) or "xyzt_units" not in set(keys()):
         return 1.0

@@ -1,4 +1,4 @@
-"""The one door through which every array comes in: as_source()."""
+"""as_source(), through which every array comes in."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ class ArraySource:
     (x, y, z) and all else is (z, y, x).
 
     shape         (nz, ny, nx), voxels; each 2 to 65,536
-    dtype         of what read() returns: uint8, int8, uint16, int16, uint32, int32, uint64,
+    dtype         type of what read() returns: uint8, int8, uint16, int16, uint32, int32, uint64,
                   int64, float32 or float64, in native byte order
     spacing       (z, y, x), world units between voxels, above 0
     origin        (z, y, x), world position of voxel (0, 0, 0)
     direction     [3, 3] float64, not writable; column a is the world direction (x, y, z) of index
                   axis a, a in the order x, y, z; can be inverted, may mirror
-    chunk_layers  layers along z of the store's largest chunks, 1 where there are none: slabs of a
+    chunk_layers  layers along z of the store's largest chunks, 1 if there are no chunks; slabs of a
                   multiple of it hold whole chunks
     no_data       value of voxels without data, as the array's metadata says; None: it says none
     """

@@ -76,7 +76,7 @@ def type_with_nan(dtype: np.dtype[Any]) -> np.dtype[Any]:
 def no_data_of(value: Any) -> float | None:
     """Returns the number that metadata gives for voxels without data.
 
-    None where it gives none, and for NaN: such voxels have no data in any case.
+    None if it gives none, and for NaN: NaN voxels have no data in any case.
     """
     try:
         (number,) = np.asarray(value).ravel().tolist()
@@ -87,9 +87,9 @@ def no_data_of(value: Any) -> float | None:
 
 
 def checked_fill(fill_value: Any, dtype: np.dtype[Any], what: str) -> Any:
-    """Returns fill_value as a number of dtype. NaN is one where dtype is a float.
+    """Returns fill_value as a number of dtype. NaN is one if dtype is a float.
 
-    Raises ArrayValueError where dtype does not hold it.
+    Raises ArrayValueError if dtype does not hold it.
     """
     if (
         isinstance(fill_value, (float, np.floating))
@@ -111,7 +111,7 @@ def to_voxels(
     """Returns layers as a C-contiguous array of dtype; a view of them if they are that already.
 
     block       layers of the store, (z, y, x); a masked array's masked voxels become fill_value
-    dtype       what read_type() says of the stored type
+    dtype       read_type() of the stored type
     fill_value  of dtype, as checked_fill() returns it; None: masked voxels are refused
     z_begin     the block's first layer in the volume, for messages
 

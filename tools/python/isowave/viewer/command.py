@@ -54,7 +54,7 @@ def reversed_axes(option: str, values: list[Any] | None) -> tuple[Any, ...] | No
 
 
 class _Parser(argparse.ArgumentParser):
-    """Says in one line what is wrong, with status 1, as the other commands do."""
+    """Says in one line what is wrong, and exits with status 1, as the other commands do."""
 
     def error(self, message: str) -> NoReturn:
         self.exit(1, f"{self.prog}: {message}\n")
@@ -96,7 +96,7 @@ def make_parser() -> argparse.ArgumentParser:
 
 
 def _argument(parse: Any) -> Any:
-    """argparse shows the text of this error alone."""
+    """Makes argparse show only the text of a ValueError."""
 
     def parsed(text: str) -> Any:
         try:

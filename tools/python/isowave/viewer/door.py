@@ -1,4 +1,4 @@
-"""HTTP at the socket: the head of a request, within a time; who may enter; answers.
+"""HTTP at the socket: heads of requests, their time limit, the token, answers.
 
 A connection carries one request. All answers have the same headers and close the connection.
 """
@@ -58,7 +58,7 @@ class Request:
     fields: dict[str, list[str]]
 
     def only(self, name: str) -> str:
-        """The value of a field that comes once; "": it comes never, or several times."""
+        """The value of a field that comes once; "" if it never comes, or several times."""
         values = self.fields.get(name, [])
         return values[0] if len(values) == 1 else ""
 
@@ -69,9 +69,9 @@ class Request:
 
 
 async def read_head(reader: asyncio.StreamReader) -> tuple[bytes, bytes]:
-    """The head of a request, with the empty line at its end, and what came behind it.
+    """Returns the head of a request, with the empty line at its end, and the bytes behind it.
 
-    Raises Refused; EOFError when the connection ends before the head does.
+    Raises Refused; EOFError if the connection ends before the head does.
     """
     got = b""
     while b"\r\n\r\n" not in got:

@@ -1,4 +1,4 @@
-"""What the viewer needs of isowave's classes. Tests have others that do as much."""
+"""The interfaces that the viewer needs of isowave's classes. Tests have classes of their own."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from isowave._request import Request
 
 
 class ImageLike(Protocol):
-    """What the viewer needs of isowave.Image."""
+    """The part of isowave.Image that the viewer needs."""
 
     @property
     def rgb(self) -> NDArray[np.uint8] | None:
@@ -37,7 +37,7 @@ class ImageLike(Protocol):
 
 
 class ProgressLike(Protocol):
-    """What the viewer needs of what on_pass gets."""
+    """The part of the argument of on_pass that the viewer needs."""
 
     @property
     def passes(self) -> int:
@@ -53,7 +53,7 @@ class ProgressLike(Protocol):
 
 
 class RendererLike(Protocol):
-    """What the viewer needs of isowave.Renderer."""
+    """The part of isowave.Renderer that the viewer needs."""
 
     @property
     def device(self) -> Mapping[str, Any]:
@@ -71,7 +71,7 @@ class RendererLike(Protocol):
 
 
 class VolumeLike(Protocol):
-    """What the viewer needs of isowave.Volume."""
+    """The part of isowave.Volume that the viewer needs."""
 
     @property
     def shape(self) -> tuple[int, int, int]:

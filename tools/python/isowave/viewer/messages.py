@@ -1,4 +1,4 @@
-"""What front ends are sent: view.js describes these messages."""
+"""Messages to front ends: view.js describes them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .turns import Frame, Stage
 def welcome(
     volume: VolumeLike, title: str, value_range: tuple[float, float], isovalue: float | None
 ) -> dict[str, Any]:
-    """What is known of the volume. isovalue: the first one."""
+    """Facts about the volume. isovalue: the first one."""
     return {
         "type": "welcome",
         "version": VERSION,
@@ -58,7 +58,7 @@ def histogram(counts: NDArray[Any], edges: NDArray[Any]) -> dict[str, Any]:
 
 
 def error(raised: Exception, wish: int | None) -> dict[str, Any]:
-    """wish: the one that it concerns; None: it concerns all clients."""
+    """An error. wish: the wish that it concerns; None: it concerns all clients."""
     return {"type": "error", "wish": wish, "message": first_line(raised)}
 
 

@@ -18,7 +18,7 @@ JPEG_QUALITY: Final = 70
 
 
 def count_rays(size: tuple[int, int], samples: int) -> int:
-    """Rays of a picture: samples x samples a pixel."""
+    """Number of rays of a picture: samples x samples a pixel."""
     return size[0] * size[1] * samples * samples
 
 
@@ -27,8 +27,8 @@ class Extent:
     """How much is drawn for a picture.
 
     size     width, height [pixels]
-    samples  rays of a pixel along each axis
-    ambient  rays of a hit
+    samples  rays per pixel along each axis
+    ambient  ambient rays per hit
     """
 
     size: tuple[int, int]
@@ -37,29 +37,29 @@ class Extent:
 
     @staticmethod
     def of(request: Request) -> Extent:
-        """All that a request with a size asks for."""
+        """The extent of a request with a size."""
         assert request.size is not None
         return Extent(request.size, request.samples, request.ambient)
 
     @property
     def rays(self) -> int:
-        """Those of the camera."""
+        """Rays of the camera."""
         return count_rays(self.size, self.samples)
 
     @property
     def all_rays(self) -> int:
-        """At most, with the ambient ones."""
+        """Most rays, with the ambient ones."""
         return self.rays * (1 + self.ambient)
 
     def within(self, max_rays: int, max_all_rays: int) -> Extent:
-        """A smaller one, with no more rays than these: first fewer pixels, then ambient rays."""
+        """A smaller extent with at most so many rays: fewer pixels first, then ambient rays."""
         size = fit_size(self.size, self.samples, min(max_rays, max_all_rays))
         fitted = count_rays(size, self.samples)
         return Extent(size, self.samples, min(self.ambient, max(0, max_all_rays // fitted - 1)))
 
 
 def fit_size(size: tuple[int, int], samples: int, max_rays: int) -> tuple[int, int]:
-    """The size [pixels], made smaller in its shape if it has more rays than there may be."""
+    """The size [pixels], made smaller in its shape if it has too many rays."""
     if count_rays(size, samples) <= max_rays:
         return size
     scale = math.sqrt(max_rays / count_rays(size, samples))
@@ -103,11 +103,11 @@ def share_within(
 
 
 class Stopped(Exception):
-    """A picture that is no longer wanted was not encoded to its end."""
+    """The picture was not encoded to its end, since it is no longer wanted."""
 
 
 class _Stream(io.BytesIO):
-    """Raises Stopped when more is written and the picture is no longer wanted."""
+    """Raises Stopped if more is written and the picture is no longer wanted."""
 
     def __init__(self, is_wanted: Callable[[], bool]) -> None:
         super().__init__()

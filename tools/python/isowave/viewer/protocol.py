@@ -1,4 +1,4 @@
-"""The messages of the viewer: what a front end (view.js) may say, and what makes it be refused.
+"""The messages of the viewer: what a front end (view.js) may say, and what is refused.
 
 A front end sends JSON objects; `parse` and `check` turn them into the classes below or raise
 `ProtocolError`, whose text is one line that a person can read. Anything that is not exactly one of
@@ -133,7 +133,7 @@ def check(content: object) -> Message:
 
 
 def first_line(error: Exception) -> str:
-    """What an error says, in one line of bounded length."""
+    """Text of an error, in one line of bounded length."""
     lines = str(error).strip().splitlines()
     return (lines[0] if lines else type(error).__name__)[:500]
 

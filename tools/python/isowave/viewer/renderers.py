@@ -189,6 +189,9 @@ class Renderers:
             self.renderer, self._made = None, None
             self._tell(None)
         self._do(lambda: self._make_for_device(wanted))
+        # Not by a renderer with quick=True: a wish with max_error or time_budget would wait for the
+        # device. The host leaves both out, and the device then draws the wish with them. The host's
+        # renderer is made in a thread of its own, and only if the device takes long.
         if self._make_host is not None:
             self._do(self._make_for_host)
 

@@ -7,8 +7,8 @@
 
 Anything else, a wrong token and a foreign Origin are answered with 403.
 
-Connections that have not shown the token yet have places of their own. When these are full, the
-oldest such connection ends. So connections without the token never keep out those that have it.
+Connections without the token have places of their own. If these are full, the oldest such
+connection ends. So connections without the token never keep out those with it.
 """
 
 from __future__ import annotations
@@ -51,17 +51,17 @@ NOT_READ: Final = "the client does not read what it is sent"
 
 @dataclass(frozen=True)
 class Limits:
-    """What a server takes from its clients.
+    """Limits that a server sets to its clients.
 
-    message_rate, message_burst  messages of a client: a second, and at once
-    queue           messages that wait to be sent to a client; more: it is gone
-    connections     at the same time, of those that have shown the token
-    strangers       at the same time, of those that have not; when one more comes, the oldest ends
-    head_seconds    for the whole head of a request
-    answer_seconds  for an answer to be taken, or for a websocket that ends to be closed
-    hello_seconds   from the websocket's beginning to the client's hello
-    idle_seconds    for a client to read something while it is sent something; for the answer to a
-                    ping, and between pings
+    message_rate, message_burst  most messages of a client a second, and at once
+    queue           most messages that wait to be sent to a client; a client with more is gone
+    connections     most connections with the token at the same time
+    strangers       most connections without the token; if one more comes, the oldest ends
+    head_seconds    time for the whole head of a request
+    answer_seconds  time in which a client takes an answer, or closes a websocket that ends
+    hello_seconds   time from the websocket's beginning to the client's hello
+    idle_seconds    time in which a client reads something that it is sent, or answers a ping; also
+                    the time between pings
     """
 
     message_rate: float = 250
@@ -78,11 +78,11 @@ class Limits:
 class Server:
     """Serves a scene from a thread of its own, until close().
 
-    host, port  to listen at; port 0: a free one
+    host, port  address to listen at; port 0: a free one
     listener    a socket that listens there already, or None
     token       lets its holders look; None: a random one of 192 bits
 
-    Raises OSError or ValueError, whose text is one line, when it cannot listen there.
+    Raises OSError or ValueError, whose text is one line, if it cannot listen there.
     """
 
     def __init__(
@@ -112,12 +112,12 @@ class Server:
 
     @property
     def url(self) -> str:
-        """Where the page is. All who have it may look at the volume."""
+        """Address of the page. Everyone with this address may look at the volume."""
         host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(self.host, self.host)
         return f"http://{f'[{host}]' if ':' in host else host}:{self.port}/{self.token}/"
 
     def url_for_once(self) -> str:
-        """A URL that leads to the page when it is opened first, and then no more."""
+        """A URL that leads to the page the first time that it is opened."""
         return self.url.removesuffix(f"{self.token}/") + self._door.make_code()
 
     def __repr__(self) -> str:
@@ -173,7 +173,7 @@ class Server:
             await asyncio.wait(self._tasks, timeout=CLOSE_SECONDS)
 
     async def _take(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        """One connection, from its beginning to its end."""
+        """Serves one connection, from its beginning to its end."""
         task = asyncio.current_task()
         assert task is not None
         self._tasks.add(task)
@@ -221,7 +221,7 @@ class Server:
             raise Refused(408) from None
 
     def _admit(self, request: Request, writer: asyncio.StreamWriter) -> None:
-        """Gives a connection with the token one of the places for these. Raises Refused."""
+        """Gives a connection with the token a place. Raises Refused."""
         if self._door.takes_code(request):
             raise Refused(303, Location=f"/{self.token}/")
         if not self._door.may_enter(request):
@@ -248,13 +248,13 @@ class Server:
 
 
 def _report(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
-    """Failures of sockets are no news: a connection that cannot be accepted waits."""
+    """Ignores failures of sockets: a connection that cannot be accepted waits."""
     if not isinstance(context.get("exception"), OSError):
         loop.default_exception_handler(context)
 
 
 def _shake_hands(head: bytes) -> ServerProtocol:
-    """A websocket whose answer is still to be sent. Raises Refused."""
+    """Returns a websocket whose answer is still to be sent. Raises Refused."""
     protocol = ServerProtocol(max_size=MAX_MESSAGE_BYTES)
     protocol.receive_data(head)
     events = protocol.events_received()
@@ -308,7 +308,7 @@ class _Connection:
             self._end.set_result(_Ended(code, reason))
 
     async def run(self, begun: bytes) -> None:
-        """begun: what came behind the handshake's head."""
+        """Runs the connection. begun: bytes that came behind the handshake's head."""
         works = (self._read(begun), self._write(), self._ping())
         tasks = [asyncio.create_task(self._until_end(work)) for work in works]
         timer = self._loop.call_later(self._limits.hello_seconds, self._expect_hello)
@@ -467,7 +467,7 @@ def serve(
 
 
 def wait_and_close(server: Server) -> str | None:
-    """Serves until Ctrl-C; returns at once why it cannot, if so."""
+    """Serves until Ctrl-C. If it cannot serve, returns the reason at once."""
     try:
         server.wait()
     except KeyboardInterrupt:

@@ -18,7 +18,7 @@ class Session:
     """Checks a front end's messages, limits their rate, and hands them to the scene.
 
     post    as Client's
-    rate    messages a second; burst: at once
+    rate    most messages a second; burst: most at once
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class Session:
         return self._client is not None
 
     def close(self) -> None:
-        """Ends it. May be called twice."""
+        """Ends the session. May be called twice."""
         self._closed = True
         if self._client is not None:
             self._scene.leave(self._client)

@@ -25,7 +25,7 @@ MAX_VIEWS: Final = 8  # of a widget; the one that was silent for longest makes r
 class Widget(anywidget.AnyWidget):
     """A view of a scene.
 
-    height  of the widget [CSS pixels]
+    height  height of the widget [CSS pixels]
     """
 
     _esm = script()
@@ -42,7 +42,7 @@ class Widget(anywidget.AnyWidget):
         self.on_msg(self._receive)
 
     def _receive(self, widget: object, content: object, buffers: object) -> None:
-        """A message of a view: {"view": its name, "message": as in protocol.py}."""
+        """Takes a message of a view: {"view": its name, "message": as in protocol.py}."""
         if not isinstance(content, dict) or content.keys() != {"view", "message"}:
             return
         view, message = content["view"], content["message"]
@@ -99,7 +99,7 @@ _scenes: dict[tuple[Any, ...], tuple[Scene, int]] = {}  # in use, and by how man
 
 
 def show(volume: VolumeLike, *, height: int = 540, **options: Any) -> Widget:
-    """A widget that shows a volume. Widgets of one volume and the same options share a renderer.
+    """Shows a volume in a widget. Widgets of one volume and the same options share a renderer.
 
     options  as for Scene
     """

@@ -1,0 +1,90 @@
+#pragma once
+// Pictures at once by one renderer, until a better one is made: a device's takes long, since its
+// kernels are compiled.
+
+#include <atomic>
+#include <exception>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <stop_token>
+#include <thread>
+
+#include "core/frame/renderer.hpp"
+
+namespace isowave::core {
+
+/// The two renderers of a SoonRenderer, and what is known of them before they are made. Both draw
+/// the same volume, alone.
+struct SoonParts {
+  Abilities abilities;  ///< of the renderer that takes long
+  /// Makes that renderer, in a thread of its own. If a stop is requested, it should throw soon.
+  std::function<std::shared_ptr<Renderer>(const std::stop_token &)> make;
+  /// Called before the renderer that takes long works for a call, in the thread of that call.
+  std::function<void()> before_use = [] {};
+  Abilities meanwhile_abilities;  ///< of the renderer that draws meanwhile
+  /// Makes that renderer when a frame first needs it. What it throws is not told: frames then wait
+  /// for the other renderer.
+  std::function<std::unique_ptr<Renderer>()> make_meanwhile;
+};
+
+/// Draws by the renderer meanwhile until the other one is ready, from then on by that one. A frame
+/// at work when it becomes ready is begun anew (PassStats::begins_anew). A request that the
+/// renderer meanwhile cannot draw waits. If making the other renderer fails, each call that needs
+/// it throws what went wrong.
+///
+/// ready(), ready_for(), abilities(), memory_bytes(), wait() and give_up() may be called from any
+/// thread.
+class SoonRenderer : public RendererAround {
+ public:
+  /// Returns at once.
+  explicit SoonRenderer(SoonParts parts);
+  /// Requests a stop, and waits for it.
+  ~SoonRenderer() override = default;
+
+  /// Whether the renderer that takes long is made, or has failed.
+  bool ready() const { return is_ready_; }
+  /// Whether render() does not wait until ready() for a request that needs such abilities.
+  bool ready_for(const FrameRequest &request) const;
+  /// Waits until ready().
+  ///
+  /// Throws  what went wrong when the renderer was made
+  void wait() const;
+  /// Requests a stop of the making, and does not wait.
+  void give_up() { maker_.request_stop(); }
+
+  Abilities abilities() const override { return parts_.abilities; }
+  const Abilities &meanwhile_abilities() const { return parts_.meanwhile_abilities; }
+  Team &team() override { return Renderer::team(); }
+  /// Waits until ready().
+  std::vector<VolumeInfo> levels() const override;
+  FrameStats render(const FrameRequest &request) override;
+  std::vector<HitRecord> cast_rays(std::span<const WorldRay> rays, float isovalue,
+                                   Normals normals) override;
+  Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {}) override;
+  void clear_cache() override;
+  /// Memory of the renderer that took long, as its last call left it; 0 before it is ready.
+  std::uint64_t memory_bytes() const override { return is_ready_ ? memory_bytes_.load() : 0; }
+  double setup_ms() const override { return is_ready_ && made_ ? made_->setup_ms() : 0; }
+
+ private:
+  void make(const std::stop_token &stop);
+  void note_memory();
+  Renderer &wait_for_ready();
+  Renderer *find_meanwhile();
+  Renderer &find_any();
+  Renderer &inner() const override;
+
+  SoonParts parts_;
+  std::unique_ptr<Renderer> meanwhile_;
+  bool has_meanwhile_ = true;     ///< false: it could not be made
+  Renderer *drawn_by_ = nullptr;  ///< the last frame; null: none was drawn
+  // The thread that makes the renderer writes both; others read them once is_ready_ is true.
+  std::shared_ptr<Renderer> made_;
+  std::exception_ptr failure_;
+  std::atomic<std::uint64_t> memory_bytes_ = 0;
+  std::atomic<bool> is_ready_ = false;
+  std::jthread maker_;  ///< the last member: it ends before the others go
+};
+
+}  // namespace isowave::core
