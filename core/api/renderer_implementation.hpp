@@ -24,7 +24,6 @@ struct LastFrame {
 };
 
 struct Renderer::Implementation {
- public:
   /// turns   of calls: those of the device, if other renderers use it
   /// of      the volume that this process draws, which must outlive this
   Implementation(std::shared_ptr<Turns> turns, const core::CompressedVolume &of,
