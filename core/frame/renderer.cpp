@@ -11,7 +11,7 @@ namespace isowave::core {
 
 namespace {
 
-/// What must be chosen by the renderer, or by the user, not by both.
+/// Checks settings that either the renderer or the user may choose, not both.
 void check_choices(const FrameRequest &request) {
   if (!request.max_surface_error) return;
   if (request.time_budget_ms)

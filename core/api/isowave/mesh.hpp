@@ -14,7 +14,7 @@
 
 namespace isowave {
 
-/// Where vertices are on the edges between voxels.
+/// Places of vertices on the edges between voxels.
 enum class VertexPlaces {
   /// At least 1/1024 of the edge away from its voxels. So no two vertices meet, every triangle has
   /// an area, and programs that merge vertices by position find the mesh closed.
