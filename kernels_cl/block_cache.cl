@@ -164,6 +164,54 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_ra
   }
 }
 
+/// Finds the blocks that the ray served first needs: stamps the slots of those that are cached.
+/// Returns how many are not. One work-item.
+///
+/// Out     missing [8]: those
+ISO_INLINE uint find_first_blocks(const FrameParams *frame, global const CacheState *cache,
+                                  global const BlockEntry *table, global uint *slot_stamps,
+                                  uint stamp, local uint *missing) {
+  const uint block_id = cache->first_block_id; /* invalid: that ray needs nothing */
+  uint num_missing = 0;
+  for (uint corner = 0; corner < 8 && block_id != ISO_INVALID_ID; ++corner) {
+    const BlockCoords b = block_coords(frame, block_id);
+    const uint x = b.x + (corner & 1), y = b.y + (corner >> 1 & 1), z = b.z + (corner >> 2);
+    const uint exists = (uint)exists_where_touched(frame, b, corner);
+    if ((cache->first_touched >> corner & exists) != 0) {
+      const uint slot = cached_slot(frame, table, x, y, z);
+      if (slot != ISO_BLOCK_ABSENT) {
+        slot_stamps[slot] = stamp;
+      } else {
+        missing[num_missing++] = block_id_at(frame, x, y, z);
+      }
+    }
+  }
+  return num_missing;
+}
+
+/// Puts blocks to the front of the request list: each is swapped to its place; if the list ended
+/// too early for it, the block there asks again. One work-item.
+///
+/// blocks  [num_blocks]
+/// places  [num_blocks] where they stand on the list, ISO_INVALID_ID: nowhere; overwritten
+ISO_INLINE void put_first(const FrameParams *frame, local const uint *blocks, local uint *places,
+                          uint num_blocks, global uint *requested_bits,
+                          global uint *request_block_ids) {
+  for (uint j = 0; j < num_blocks; ++j) {
+    const uint displaced = request_block_ids[j];
+    if (places[j] == ISO_INVALID_ID) {
+      const BlockCoords b = block_coords(frame, displaced);
+      requested_bits[request_word(frame, b.x, b.y, b.z)] &= ~request_bit(frame, b.x, b.y, b.z);
+    } else {
+      request_block_ids[places[j]] = displaced;
+    }
+    request_block_ids[j] = blocks[j];
+    for (uint later = j + 1; later < num_blocks; ++later) {
+      if (places[later] == j) places[later] = places[j];
+    }
+  }
+}
+
 /// Decides how many slots are freed, and of which ranks they are.
 ///
 /// Out     rank_histogram: 0 again
@@ -188,22 +236,10 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_se
   const int scarce = counts->requested_count > min(num_slots - in_use, capacity);
   const uint searched = scarce ? requested : 0;
   if (item == 0) {
-    const uint block_id = cache->first_block_id; /* invalid: that ray needs nothing */
-    num_first_missing = 0;
-    for (uint corner = 0; corner < 8 && scarce && block_id != ISO_INVALID_ID; ++corner) {
-      const BlockCoords b = block_coords(frame, block_id);
-      const uint x = b.x + (corner & 1), y = b.y + (corner >> 1 & 1), z = b.z + (corner >> 2);
-      const uint exists = (uint)exists_where_touched(frame, b, corner);
-      if ((cache->first_touched >> corner & exists) != 0) {
-        const uint slot = cached_slot(frame, table, x, y, z);
-        if (slot != ISO_BLOCK_ABSENT) {
-          slot_stamps[slot] = needed_stamp(counts->pass + 1);
-        } else {
-          places[num_first_missing] = ISO_INVALID_ID;
-          first_missing[num_first_missing++] = block_id_at(frame, x, y, z);
-        }
-      }
-    }
+    num_first_missing = scarce ? find_first_blocks(frame, cache, table, slot_stamps,
+                                                   needed_stamp(counts->pass + 1), first_missing)
+                               : 0;
+    for (uint j = 0; j < num_first_missing; ++j) places[j] = ISO_INVALID_ID;
   }
   barrier(CLK_LOCAL_MEM_FENCE);
   for (uint i = item; i < searched; i += ISO_GROUP_SIZE) {
@@ -215,20 +251,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_se
   barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
   if (item == 0) {
     uint granted, evicted, rank, before = 0, before_own = 0;
-    /* Swap each to place j; if the list ended too early, put it there. */
-    for (uint j = 0; j < num_first_missing; ++j) {
-      const uint displaced = request_block_ids[j];
-      if (places[j] == ISO_INVALID_ID) {
-        const BlockCoords b = block_coords(frame, displaced);
-        requested_bits[request_word(frame, b.x, b.y, b.z)] &= ~request_bit(frame, b.x, b.y, b.z);
-      } else {
-        request_block_ids[places[j]] = displaced;
-      }
-      request_block_ids[j] = first_missing[j];
-      for (uint later = j + 1; later < num_first_missing; ++later) {
-        if (places[later] == j) places[later] = places[j];
-      }
-    }
+    put_first(frame, first_missing, places, num_first_missing, requested_bits, request_block_ids);
     granted = min(requested, max(num_slots - in_use, num_first_missing));
     evicted = granted > num_free ? granted - num_free : 0;
     if (evicted !=

@@ -68,6 +68,58 @@ ISO_INLINE void voxel_gradient(const BlockGrid *grid, const Neighbourhood *n, Bl
                                      voxel_near(n, x, y, z + (pz < last_z)), pz, last_z);
 }
 
+/// Block b of a list, and those behind it (x + 2y + 4z) whose vertices its triangles have.
+typedef struct ListedBlocks {
+  local const uint *first_vertex;                 /* [8] on the list, of each block */
+  local const ulong *edges_x, *edges_y, *edges_z; /* [8] BlockEdges */
+} ListedBlocks;
+
+/// The place of a block in the list of blocks, ISO_INVALID_ID: it is not there.
+ISO_INLINE uint listed_entry(const BlockGrid *grid, global const uint *listed_masks,
+                             global const uint *listed_offsets, uint x, uint y, uint z) {
+  const uint coarse_x = (grid->blocks_x + 3) / 4, coarse_y = (grid->blocks_y + 3) / 4;
+  const uint coarse = x / 4 + coarse_x * (y / 4 + coarse_y * (z / 4));
+  const uint bit = (x & 3) + 4 * (y & 3) + 16 * (z & 3);
+  const ulong mask = (ulong)listed_masks[2 * coarse + 1] << 32 | listed_masks[2 * coarse];
+  if ((mask >> bit & 1) == 0) return ISO_INVALID_ID;
+  return listed_offsets[coarse] + count_bits(mask & (((ulong)1 << bit) - 1));
+}
+
+/// Writes the vertex on the edge of a voxel along an axis.
+///
+/// entry     of the block in the batch
+/// gradient  [3] not written unless with_gradients
+ISO_INLINE void write_vertex(const FrameParams *frame, const Neighbourhood *n, BlockCoords b,
+                             uint entry, uint voxel, uint axis, uint with_gradients,
+                             global MeshVertex *vertex, global float *gradient) {
+  const int x = voxel & 3, y = voxel >> 2 & 3, z = voxel >> 4;
+  const int ux = x + (axis == 0), uy = y + (axis == 1), uz = z + (axis == 2);
+  const float lower = voxel_near(n, x, y, z), upper = voxel_near(n, ux, uy, uz);
+  const float t = edge_crossing(lower, upper, frame->surface.isovalue);
+  vertex->edge = entry << ISO_VERTEX_BLOCK_SHIFT | axis << 6 | voxel;
+  vertex->t = t;
+  if (with_gradients != 0) {
+    float at_lower[3], at_upper[3];
+    voxel_gradient(&frame->grid, n, b, x, y, z, at_lower);
+    voxel_gradient(&frame->grid, n, b, ux, uy, uz, at_upper);
+    const Gradient g = vertex_gradient(at_lower, at_upper, t, axis, upper - lower);
+    gradient[0] = g.x;
+    gradient[1] = g.y;
+    gradient[2] = g.z;
+  }
+}
+
+/// The number on the list of a vertex of the cell of a voxel.
+ISO_INLINE uint vertex_number(const ListedBlocks *blocks, uint voxel, uint edge) {
+  const uint corner = edge_corner(edge);
+  const uint x = (voxel & 3) + (corner & 1), y = (voxel >> 2 & 3) + (corner >> 1 & 1),
+             z = (voxel >> 4) + (corner >> 2);
+  const uint block = (x >> 2) + 2 * (y >> 2) + 4 * (z >> 2);
+  return blocks->first_vertex[block] + vertex_rank(blocks->edges_x[block], blocks->edges_y[block],
+                                                   blocks->edges_z[block], edge_axis(edge),
+                                                   (x & 3) + 4 * (y & 3) + 16 * (z & 3));
+}
+
 /// Entries [begin, end) of the list, a work-group each, in rows of a work-item for each voxel and
 /// its cell.
 ///
@@ -94,6 +146,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void marching
   local ulong edges_x[8], edges_y[8], edges_z[8], of_blocks[8];
   const uint item = get_local_id(0);
   const Neighbourhood near_block = {slots, cache_values};
+  const ListedBlocks blocks = {first_vertex, edges_x, edges_y, edges_z};
   const NoDataTable no_data = {index, no_data_begin};
   for (uint i = begin + get_group_id(0); i < end; i += get_num_groups(0)) {
     const BlockCoords b = block_coords(frame, block_ids[i]);
@@ -108,12 +161,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void marching
       const uint nx = b.x + (n & 1), ny = b.y + (n >> 1 & 1), nz = b.z + (n >> 2);
       uint entry = ISO_INVALID_ID, slot = ISO_BLOCK_ABSENT;
       if (dual_grid_block(frame, b, n) != ISO_INVALID_ID) {
-        const uint coarse_x = (grid.blocks_x + 3) / 4, coarse_y = (grid.blocks_y + 3) / 4;
-        const uint coarse = nx / 4 + coarse_x * (ny / 4 + coarse_y * (nz / 4));
-        const uint bit = (nx & 3) + 4 * (ny & 3) + 16 * (nz & 3);
-        const ulong mask = (ulong)listed_masks[2 * coarse + 1] << 32 | listed_masks[2 * coarse];
-        if ((mask >> bit & 1) != 0)
-          entry = listed_offsets[coarse] + count_bits(mask & (((ulong)1 << bit) - 1));
+        entry = listed_entry(&grid, listed_masks, listed_offsets, nx, ny, nz);
         slot = cached_slot(frame, table, nx, ny, nz);
       }
       of_blocks[n] = slot == ISO_BLOCK_ABSENT ? 0 : inside[slot];
@@ -129,48 +177,26 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void marching
     uint before = triangle_offsets[i] - triangle_offsets[begin]; /* triangles of the rows before */
     for (uint row = 0; row < ISO_BLOCK_VOXELS; row += ISO_GROUP_SIZE) {
       const uint voxel = row + item;
-      const int x = voxel & 3, y = voxel >> 2 & 3, z = voxel >> 4;
       for (uint axis = 0; axis < 3; ++axis) {
         const ulong own = axis == 0 ? edges_x[0] : axis == 1 ? edges_y[0] : edges_z[0];
         if ((own >> voxel & 1) != 0) {
           const uint place = first_vertex[0] - first_of_batch +
                              vertex_rank(edges_x[0], edges_y[0], edges_z[0], axis, voxel);
-          const int ux = x + (axis == 0), uy = y + (axis == 1), uz = z + (axis == 2);
-          const float lower = voxel_near(&near_block, x, y, z),
-                      upper = voxel_near(&near_block, ux, uy, uz);
-          const float t = edge_crossing(lower, upper, frame->surface.isovalue);
-          vertices[place].edge = (i - begin) << ISO_VERTEX_BLOCK_SHIFT | axis << 6 | voxel;
-          vertices[place].t = t;
-          if (with_gradients != 0) {
-            float at_lower[3], at_upper[3];
-            voxel_gradient(&grid, &near_block, b, x, y, z, at_lower);
-            voxel_gradient(&grid, &near_block, b, ux, uy, uz, at_upper);
-            const Gradient g = vertex_gradient(at_lower, at_upper, t, axis, upper - lower);
-            gradients[3 * place] = g.x;
-            gradients[3 * place + 1] = g.y;
-            gradients[3 * place + 2] = g.z;
-          }
+          write_vertex(frame, &near_block, b, i - begin, voxel, axis, with_gradients,
+                       &vertices[place], gradients + 3 * place);
         }
       }
 
       uint total;
-      const uint signs = signs_of_cell(cells, of_blocks, (uint)x, (uint)y, (uint)z);
+      const uint signs = signs_of_cell(cells, of_blocks, voxel & 3, voxel >> 2 & 3, voxel >> 4);
       global const uchar *own_triangles = cell_triangles + ISO_CASE_BYTES * signs;
       const uint num_triangles = own_triangles[0];
       const uint place = before + group_scan(sums, num_triangles, &total);
       for (uint triangle = 0; triangle < num_triangles; ++triangle) {
-        uint numbers[3];
-        for (uint k = 0; k < 3; ++k) {
-          const uint edge = own_triangles[1 + 3 * triangle + k], corner = edge_corner(edge);
-          const uint cx = x + (corner & 1), cy = y + (corner >> 1 & 1), cz = z + (corner >> 2);
-          const uint block = (cx >> 2) + 2 * (cy >> 2) + 4 * (cz >> 2);
-          numbers[k] = first_vertex[block] + vertex_rank(edges_x[block], edges_y[block],
-                                                         edges_z[block], edge_axis(edge),
-                                                         (cx & 3) + 4 * (cy & 3) + 16 * (cz & 3));
-        }
-        triangles[place + triangle].a = numbers[0];
-        triangles[place + triangle].b = numbers[1];
-        triangles[place + triangle].c = numbers[2];
+        global const uchar *own_edges = own_triangles + 1 + 3 * triangle;
+        triangles[place + triangle].a = vertex_number(&blocks, voxel, own_edges[0]);
+        triangles[place + triangle].b = vertex_number(&blocks, voxel, own_edges[1]);
+        triangles[place + triangle].c = vertex_number(&blocks, voxel, own_edges[2]);
       }
       before += total;
     }

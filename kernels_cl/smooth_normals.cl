@@ -99,6 +99,17 @@ ISO_INLINE void stamp_stencil(global uint *slot_stamps, uint stamp, BlockCoords 
   }
 }
 
+/// Gives a hit its gradient, made of cached blocks.
+ISO_INLINE void write_gradient(global HitRecord *hit, const CachedStencil *cached,
+                               const Stencil *stencil) {
+  const CellPoint at = {hit->x, hit->y, hit->z};
+  const Gradient gradient = cached_gradient(cached, stencil, at);
+  if (is_no_gradient(gradient)) return;
+  hit->grad_x = gradient.x;
+  hit->grad_y = gradient.y;
+  hit->grad_z = gradient.z;
+}
+
 /// frame_params, frames, num_frames, parts  as start_rays
 /// begins  1: all hits; nothing happens while prev->next_active_count rays are still on their way
 ///         to a hit. 0: the hits of the list
@@ -156,13 +167,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void smooth_n
       missing = touched & ~find_slots(level, table, base, touched, slots + item);
       if (missing == 0) {
         const CachedStencil cached = {cache_values, slots + item, base};
-        const CellPoint at = {hits[pixel].x, hits[pixel].y, hits[pixel].z};
-        const Gradient gradient = cached_gradient(&cached, &stencil, at);
-        if (!is_no_gradient(gradient)) {
-          hits[pixel].grad_x = gradient.x;
-          hits[pixel].grad_y = gradient.y;
-          hits[pixel].grad_z = gradient.z;
-        }
+        write_gradient(&hits[pixel], &cached, &stencil);
         stamp_stencil(slot_stamps, read_stamp(pass), b, &cached);
       } else {
         atomic_inc(&num_waiting);

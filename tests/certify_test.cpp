@@ -2,7 +2,6 @@
 // precision; and what is chosen by them.
 
 #include "core/accuracy/certify.hpp"
-#include "core/io/open_volume.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -15,12 +14,12 @@
 #include "core/render/device_renderer.hpp"
 #include "core/volume/pyramid.hpp"
 #include "core/zfp/level_bounds.hpp"
-#include "kernels_cl/portable/block_bound.h"
 #include "kernels_cl/portable/grid_dda.h"
 #include "reference/accuracy.hpp"
 #include "reference/bound_check.hpp"
 #include "reference/cell_oracle.hpp"
 #include "reference/twin.hpp"
+#include "tests/bounds_scene.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/test_devices.hpp"
 
@@ -28,6 +27,7 @@ namespace isowave::core {
 namespace {
 
 namespace fs = std::filesystem;
+using test::BoundsScene;
 using test::camera_along;
 using test::expect_same_hits;
 using testing::HasSubstr;
@@ -35,176 +35,10 @@ using testing::ThrowsMessage;
 
 constexpr ImageSize kTiny{6, 5}, kSmall{12, 8}, kMedium{96, 64};
 
-struct Scene {
-  Scene(const glm::uvec3 &dims, const test::VoxelFunction &field, CompressOptions options)
-      : source(test::sample(dims, field)) {
-    ArrayReader reader(test::grid_info(dims, {1, 1.25, 0.75}), source);
-    compress_from(reader, options);
-  }
-  Scene(const std::string &file, const CompressOptions &options) {
-    const auto reader = open_volume(fs::path(ISOWAVE_TEST_DATA) / file);
-    source.resize(reader->info().num_voxels());
-    reader->read_layers(0, reader->info().dims.z, source);
-    ArrayReader array(reader->info(), source);
-    compress_from(array, options);
-  }
-  void compress_from(VolumeReader &reader, CompressOptions options) {
-    options.measure_error = true;
-    options.levels = 0;
-    volume = compress(reader, options);
-  }
-
-  std::vector<float> source;
-  CompressedVolume volume;
-};
-
-// ---- bounds of levels
-
-TEST(BlockBound, CodesAscendByASixteenth) {
-  EXPECT_EQ(block_bound(0), 0.0f);
-  EXPECT_EQ(block_bound(255), ISO_BOUND_MAX);
-  for (uint code = 1; code < 256; ++code) {
-    EXPECT_GT(block_bound(code), block_bound(code - 1));
-    if (code > 16) {
-      EXPECT_LE(block_bound(code), block_bound(code - 1) * 1.0625f);
-    }
-  }
-}
-
-TEST(BlockBound, AreNeverBelow) {
-  for (const float scale : {0x1p-120f, 1e-3f, 1.0f, 3e20f}) {
-    std::vector<float> bounds = {0.0f};
-    for (int i = 0; i < 400; ++i) bounds.push_back(scale / (1.0f + float(i * i)));
-    const BlockBounds coded = encode_bounds(bounds);
-    for (std::size_t i = 0; i < bounds.size(); ++i) {
-      const double value = std::ldexp(double{block_bound(coded.codes[i])}, coded.exponent);
-      EXPECT_GE(value, double{bounds[i]});
-      if (scale > 0x1p-100f) {
-        EXPECT_LE(value, 1.07 * double{bounds[i]} + 4e-6 * double{scale});
-      }
-    }
-  }
-  EXPECT_THAT(encode_bounds(std::array{0.0f, 0.0f}).codes, testing::Each(0));
-}
-
-TEST(BlockBound, SharesGrowTowardsOneVoxel) {
-  std::array<int, ISO_BOUND_PLACES> num_voxels{};
-  for (uint voxel = 0; voxel < ISO_BLOCK_VOXELS; ++voxel) ++num_voxels.at(bound_place(voxel));
-  EXPECT_THAT(num_voxels, testing::ElementsAre(45, 18, 1));
-  EXPECT_EQ(bound_place(1 + 4 + 16), 2u);
-  EXPECT_EQ(bound_place(3 + 4 + 16), 1u);
-  EXPECT_EQ(bound_place(3 + 48), 1u);
-  EXPECT_EQ(bound_place(2 + 8 + 32), 1u);
-  EXPECT_EQ(bound_place(3 + 4), 0u);
-  EXPECT_LT(bound_share(0), bound_share(1));
-  EXPECT_LT(bound_share(1), bound_share(2));
-  EXPECT_EQ(bound_share(2), 1.0f);
-}
-
-/// However the volume was compressed: no voxel is off by more than its share of its block's bound,
-/// and some voxel of most blocks by nearly as much.
-TEST(BlockBound, NoVoxelExceedsItsShare) {
-  const glm::uvec3 dims(37, 40, 42);
-  for (const auto &field : {test::gyroid_field(15), test::noise_field(5)}) {
-    for (const CompressOptions &options :
-         {CompressOptions{.rate = 4}, CompressOptions{.rate = 11},
-          // The largest error not known, and known, as to convert.
-          CompressOptions{.precision = BlockPrecision{.min_exponent = -5}},
-          CompressOptions{.precision =
-                              BlockPrecision{.min_exponent = -5, .max_voxel_error = 0.03125}}}) {
-      const Scene scene(dims, field, options);
-      const BlockBounds &bounds = scene.volume.bounds;
-      ASSERT_TRUE(bounds.by_place);
-      const std::vector<float> decoded = decode_with_libzfp(scene.volume);
-      const ValueOffset offset{0, std::ldexp(1.0f, bounds.exponent)};
-      const glm::uvec3 blocks = scene.volume.num_blocks();
-      std::vector<double> closest(bounds.codes.size(), 0.0);
-      for (std::size_t i = 0; i < decoded.size(); ++i) {
-        const glm::uvec3 at(i % dims.x, i / dims.x % dims.y, i / dims.x / dims.y), in = at % 4u;
-        const std::size_t block =
-            at.x / 4 + blocks.x * (at.y / 4 + std::size_t{blocks.y} * (at.z / 4));
-        const double most =
-            double{offset_of_voxel(offset, bounds, block, in.x + 4 * in.y + 16 * in.z)};
-        const double off = std::abs(double{decoded[i]} - double{scene.source[i]});
-        ASSERT_LE(off, most) << "voxel " << i;
-        if (most > 0) closest[block] = std::max(closest[block], off / most);
-      }
-      std::ranges::sort(closest);
-      EXPECT_GT(closest[closest.size() / 10], 1 / 1.0625 - 1e-6);
-    }
-  }
-}
-
-/// The field that bounds span, trilinear like the volume's own, over the difference of a level from
-/// the volume: the least of many places at random. Below 1, a bound is exceeded.
-double least_slack(const Scene &scene, std::size_t level, int num_places) {
-  const glm::uvec3 dims = scene.volume.info.dims;
-  const CompressedVolume &coarse = scene.volume.coarser_levels[level];
-  const std::vector<float> voxels = decode_with_libzfp(coarse);
-  const glm::uvec3 n = coarse.info.dims, blocks = coarse.num_blocks();
-  std::vector<float> bounds(voxels.size());
-  for (std::uint32_t z = 0; z < n.z; ++z) {
-    for (std::uint32_t y = 0; y < n.y; ++y) {
-      for (std::uint32_t x = 0; x < n.x; ++x) {
-        const std::size_t block = x / 4 + blocks.x * (y / 4 + std::size_t{blocks.y} * (z / 4));
-        bounds[x + n.x * (y + std::size_t{n.y} * z)] =
-            std::ldexp(block_bound(coarse.bounds.codes[block]), coarse.bounds.exponent);
-      }
-    }
-  }
-  const CellOracle truth(scene.source, {dims.x, dims.y, dims.z}, 0.5f);
-  const CellOracle coarse_field(voxels, {n.x, n.y, n.z}, 0.5f),
-      bound(bounds, {n.x, n.y, n.z}, 0.5f);
-  const double scale = double(2u << level);
-  std::mt19937 random(5);
-  double least = 1e9;
-  for (int i = 0; i < num_places; ++i) {
-    std::array<double, 3> fine{}, at{};
-    for (int axis = 0; axis < 3; ++axis) {
-      fine[std::size_t(axis)] = double(dims[axis] - 1) * double(random()) * 0x1p-32;
-      at[std::size_t(axis)] = fine[std::size_t(axis)] / scale;
-    }
-    const double off = std::abs(coarse_field.field(at) - truth.field(fine));
-    if (off > 0) least = std::min(least, (bound.field(at) + 1e-6) / off);
-  }
-  return least;
-}
-
-TEST(LevelBounds, HoldBetweenVoxels) {
-  for (const auto &[dims, rate] :
-       {std::pair(glm::uvec3(33, 32, 40), 16u), std::pair(glm::uvec3(17, 41, 20), 16u),
-        std::pair(glm::uvec3(33, 32, 40), 4u)}) {
-    const Scene scene(dims, test::noise_field(3), {.rate = rate});
-    for (std::size_t level = 0; level < scene.volume.coarser_levels.size(); ++level) {
-      const double slack = least_slack(scene, level, 200000);
-      EXPECT_GE(slack, 1) << "level " << level + 1;
-      EXPECT_LT(slack, 2.5) << "a bound that is never needed, level " << level + 1;
-    }
-  }
-}
-
-/// Steps of a unit of the last place, alike for all voxels that share an x: what a comparison of
-/// levels may lose.
-TEST(LevelBounds, HoldFarFromZero) {
-  for (std::uint32_t seed = 0; seed < 20; ++seed) {
-    std::array<double, 33> steps;
-    std::mt19937 random(seed);
-    for (double &step : steps) step = 0.25 * double(random() % 4);
-    const auto field = [&steps](const glm::dvec3 &at) {
-      return 3e6 + steps.at(std::size_t(std::rint(at.x)));
-    };
-    const Scene scene({33, 8, 8}, field, {.rate = 32});
-    for (std::size_t level = 0; level < scene.volume.coarser_levels.size(); ++level)
-      EXPECT_GE(least_slack(scene, level, 5000), 1) << "seed " << seed << ", level " << level + 1;
-  }
-}
-
-// ---- what is certified
-
 /// Checks each bound of a frame against the source. Returns the slack, bound / error, of pixels
 /// with a hit, ascending.
 std::vector<double> expect_kept(const Certificate &certificate, std::span<const HitRecord> drawn,
-                                const Scene &scene, const Camera &camera, ImageSize size,
+                                const BoundsScene &scene, const Camera &camera, ImageSize size,
                                 float isovalue) {
   const FrameParams frame = make_frame_params(scene.volume.info, camera, size, isovalue);
   const glm::uvec3 dims = scene.volume.info.dims;
@@ -221,7 +55,7 @@ class CertifyOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
  protected:
   /// Draws a frame, checks its bounds, and counts the pixels that keep max_surface_error. Returns
   /// the hits.
-  std::vector<HitRecord> certify_frame(DeviceRenderer &renderer, const Scene &scene,
+  std::vector<HitRecord> certify_frame(DeviceRenderer &renderer, const BoundsScene &scene,
                                        const FrameRequest &request, double max_surface_error) {
     renderer.render(request);
     std::vector<HitRecord> drawn = renderer.hits();
@@ -241,7 +75,7 @@ INSTANTIATE_TEST_SUITE_P(Devices, CertifyOnDevice, testing::ValuesIn(devices_und
 
 TEST_P(CertifyOnDevice, SmallBoundsAreTheTwins) {
   const ImageSize size = is_simulator(device_.info()) ? kTiny : kSmall;
-  const Scene scene({9, 10, 11}, test::gyroid_field(9), {.rate = 6});
+  const BoundsScene scene({9, 10, 11}, test::gyroid_field(9), {.rate = 6});
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
   DeviceRenderer renderer(device_, scene.volume,
                           {.size = size, .cache_slots = 20, .with_bounds = true});
@@ -256,7 +90,7 @@ TEST_P(CertifyOnDevice, BoundsOfLevelsAndPlanesAreTheTwins) {
   for (const CompressOptions &options :
        {CompressOptions{.rate = 8},
         CompressOptions{.precision = BlockPrecision{.min_exponent = -6}}}) {
-    const Scene scene({40, 37, 44}, test::gyroid_field(11), options);
+    const BoundsScene scene({40, 37, 44}, test::gyroid_field(11), options);
     const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
     for (const StreamPlace place : {StreamPlace::kDevice, StreamPlace::kHost}) {
       ocl::Device device(GetParam());
@@ -289,7 +123,7 @@ TEST_P(CertifyOnDevice, NoCertifiedPixelIsFartherOff) {
       for (const CompressOptions &options :
            {CompressOptions{.rate = 8},
             CompressOptions{.precision = BlockPrecision{.min_exponent = -8}}}) {
-        const Scene scene(dims, field, options);
+        const BoundsScene scene(dims, field, options);
         DeviceRenderer renderer(device_, scene.volume,
                                 {.size = kMedium, .with_levels = true, .with_bounds = true});
         std::vector<Camera> cameras = orbit_cameras(scene.volume.info, 2);
@@ -311,7 +145,7 @@ TEST_P(CertifyOnDevice, NoCertifiedPixelIsFartherOff) {
 
 TEST_P(CertifyOnDevice, RealVolumes) {
   for (const char *file : {"fuel_64x33x32_uint8.raw.gz", "head_41x41x41_uint8.raw.gz"}) {
-    const Scene scene(file, {.rate = 8});
+    const BoundsScene scene(file, {.rate = 8});
     DeviceRenderer renderer(device_, scene.volume,
                             {.size = kMedium, .with_levels = true, .with_bounds = true});
     for (const float isovalue : {20.0f, 80.0f, 160.0f}) {
@@ -328,8 +162,9 @@ TEST_P(CertifyOnDevice, RealVolumes) {
 
 /// From so far that most of an error is what t loses in float32.
 TEST_P(CertifyOnDevice, FarAway) {
-  const Scene scene("head_41x41x41_uint8.raw.gz",
-                    {.precision = BlockPrecision{.min_exponent = -16, .max_voxel_error = 0x1p-16}});
+  const BoundsScene scene(
+      "head_41x41x41_uint8.raw.gz",
+      {.precision = BlockPrecision{.min_exponent = -16, .max_voxel_error = 0x1p-16}});
   Camera camera = orbit_cameras(scene.volume.info, 1)[0];
   camera.eye = camera.at + 700.0 * (camera.eye - camera.at);
   camera.fovy_deg /= 700;
@@ -348,9 +183,9 @@ TEST_P(CertifyOnDevice, ExactVolumes) {
   const auto noise = [field = test::noise_field(3)](const glm::dvec3 &at) mutable {
     return std::rint(127.5 + 127.5 * field(at));
   };
-  const Scene scene({40, 40, 40}, noise,
-                    {.precision = BlockPrecision{
-                         .min_exponent = -6, .whole_numbers = true, .max_voxel_error = 0}});
+  const BoundsScene scene({40, 40, 40}, noise,
+                          {.precision = BlockPrecision{
+                               .min_exponent = -6, .whole_numbers = true, .max_voxel_error = 0}});
   DeviceRenderer renderer(device_, scene.volume, {.size = kMedium, .with_bounds = true});
   for (const double x : {12.0, 19.0, 26.0}) {
     for (const glm::dvec3 &direction : {glm::dvec3{0.2, 0.3, 1}, glm::dvec3{1, -0.2, 0.1}}) {
@@ -368,7 +203,7 @@ TEST_P(CertifyOnDevice, BoundsAreTight) {
   for (const CompressOptions &options :
        {CompressOptions{.rate = 4}, CompressOptions{.precision = BlockPrecision{.min_exponent = -6,
                                                                  .max_voxel_error = 0.015625}}}) {
-    const Scene scene({96, 96, 96}, test::gyroid_field(48), options);
+    const BoundsScene scene({96, 96, 96}, test::gyroid_field(48), options);
     DeviceRenderer renderer(device_, scene.volume,
                             {.size = kMedium, .with_levels = true, .with_bounds = true});
     const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
@@ -391,7 +226,7 @@ TEST_P(CertifyOnDevice, BoundsAreTight) {
 
 /// The judge of the other tests: bounds that promise too much do not pass.
 TEST_P(CertifyOnDevice, BoundsThatPromiseTooMuchAreFound) {
-  const Scene scene({33, 48, 40}, test::gyroid_field(24), {.rate = 4});
+  const BoundsScene scene({33, 48, 40}, test::gyroid_field(24), {.rate = 4});
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
   DeviceRenderer renderer(device_, scene.volume, {.size = kMedium, .with_bounds = true});
   renderer.render({camera, 0.3f});
@@ -414,8 +249,8 @@ TEST_P(CertifyOnDevice, BoundsThatPromiseTooMuchAreFound) {
 
 TEST_P(CertifyOnDevice, ChoosesLessForMore) {
   const glm::uvec3 dims(96, 96, 96);
-  const Scene scene(dims, test::sphere_field(dims),
-                    {.precision = BlockPrecision{.min_exponent = -10}});
+  const BoundsScene scene(dims, test::sphere_field(dims),
+                          {.precision = BlockPrecision{.min_exponent = -10}});
   DeviceRenderer renderer(device_, scene.volume,
                           {.size = kMedium, .with_levels = true, .with_bounds = true});
   Camera camera = orbit_cameras(scene.volume.info, 1)[0];
@@ -452,7 +287,7 @@ TEST_P(CertifyOnDevice, ChoosesLessForMore) {
 
 TEST_P(CertifyOnDevice, LeavesOutPlanesOfManyBitsOnly) {
   for (const std::uint32_t rate : {8u, 16u, 24u}) {
-    const Scene scene({48, 48, 48}, test::gyroid_field(24), {.rate = rate});
+    const BoundsScene scene({48, 48, 48}, test::gyroid_field(24), {.rate = rate});
     DeviceRenderer renderer(device_, scene.volume,
                             {.size = kMedium, .with_levels = true, .with_bounds = true});
     const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
@@ -465,8 +300,8 @@ TEST_P(CertifyOnDevice, LeavesOutPlanesOfManyBitsOnly) {
 /// Where coarse levels would draw only what is farthest, they spare too little for what several
 /// levels cost.
 TEST_P(CertifyOnDevice, TakesNoLevelsThatSpareLittle) {
-  const Scene scene({96, 96, 96}, test::gyroid_field(48),
-                    {.precision = BlockPrecision{.min_exponent = -10}});
+  const BoundsScene scene({96, 96, 96}, test::gyroid_field(48),
+                          {.precision = BlockPrecision{.min_exponent = -10}});
   DeviceRenderer renderer(device_, scene.volume,
                           {.size = kMedium, .with_levels = true, .with_bounds = true});
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
@@ -483,8 +318,8 @@ TEST_P(CertifyOnDevice, TakesNoLevelsThatSpareLittle) {
 /// for certain, nothing is unknown.
 TEST_P(CertifyOnDevice, RaysThatEnterBehindABorderAreCertain) {
   const glm::uvec3 dims(96, 96, 96);
-  const Scene scene(dims, test::sphere_field(dims),
-                    {.precision = BlockPrecision{.min_exponent = -10}});
+  const BoundsScene scene(dims, test::sphere_field(dims),
+                          {.precision = BlockPrecision{.min_exponent = -10}});
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
   DeviceRenderer renderer(device_, scene.volume,
                           {.size = kMedium, .with_levels = true, .with_bounds = true});
@@ -515,7 +350,7 @@ TEST_P(CertifyOnDevice, RaysThatEnterBehindABorderAreCertain) {
 }
 
 TEST_P(CertifyOnDevice, PicturesBelowTheLargestAreTheTwins) {
-  const Scene scene({20, 20, 20}, test::gyroid_field(10), {.rate = 8});
+  const BoundsScene scene({20, 20, 20}, test::gyroid_field(10), {.rate = 8});
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
   DeviceRenderer renderer(device_, scene.volume, {.size = kMedium});
   for (const ImageSize size : {kSmall, kMedium, ImageSize{7, 5}}) {
@@ -530,7 +365,7 @@ TEST_P(CertifyOnDevice, PicturesBelowTheLargestAreTheTwins) {
 
 /// Bounds are in pixels of the picture, one for each ray.
 TEST_P(CertifyOnDevice, PixelsOfSeveralRaysAreAsWide) {
-  const Scene scene({30, 30, 30}, test::gyroid_field(10), {.rate = 8});
+  const BoundsScene scene({30, 30, 30}, test::gyroid_field(10), {.rate = 8});
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
   const auto bounds = [&](ImageSize size, double voxel_pixels) {
     DeviceRenderer renderer(device_, scene.volume,
@@ -550,7 +385,7 @@ TEST_P(CertifyOnDevice, PixelsOfSeveralRaysAreAsWide) {
 }
 
 TEST_P(CertifyOnDevice, RefusesWhatIsNotKnown) {
-  const Scene scene({20, 20, 20}, test::gyroid_field(10), {.rate = 8});
+  const BoundsScene scene({20, 20, 20}, test::gyroid_field(10), {.rate = 8});
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
   const auto certify_with = [&](const CompressedVolume &volume, const RendererOptions &options) {
     DeviceRenderer renderer(device_, volume, options);
@@ -601,7 +436,7 @@ TEST_P(CertifyOnDevice, RefusesWhatIsNotKnown) {
 
 /// A pixel covers the same at all distances.
 TEST_P(CertifyOnDevice, FramesOfParallelProjection) {
-  const Scene scene({40, 36, 44}, test::gyroid_field(13), {.rate = 8});
+  const BoundsScene scene({40, 36, 44}, test::gyroid_field(13), {.rate = 8});
   DeviceRenderer renderer(device_, scene.volume, {.size = kMedium, .with_bounds = true});
   for (const Camera &camera : orbit_cameras(scene.volume.info, 2)) {
     const FrameRequest request{.camera = in_parallel(camera), .isovalue = 0.3f};
@@ -611,7 +446,7 @@ TEST_P(CertifyOnDevice, FramesOfParallelProjection) {
 }
 
 TEST_P(CertifyOnDevice, HitsOfAnotherPictureAreRefused) {
-  const Scene scene({20, 20, 20}, test::gyroid_field(10), {.rate = 8});
+  const BoundsScene scene({20, 20, 20}, test::gyroid_field(10), {.rate = 8});
   const FrameRequest request{orbit_cameras(scene.volume.info, 1)[0], 0.3f, kSmall};
   DeviceRenderer renderer(device_, scene.volume, {.size = kSmall, .with_bounds = true}),
       plain(device_, scene.volume, {.size = kSmall});
@@ -626,7 +461,7 @@ TEST_P(CertifyOnDevice, HitsOfAnotherPictureAreRefused) {
 
 /// Whatever kind of frame comes between, and wherever it ends: the next is right.
 TEST_P(CertifyOnDevice, RequestsOfAllKindsInAnyOrder) {
-  const Scene scene({30, 27, 33}, test::gyroid_field(10), {.rate = 8});
+  const BoundsScene scene({30, 27, 33}, test::gyroid_field(10), {.rate = 8});
   const std::vector<Camera> cameras = orbit_cameras(scene.volume.info, 2);
   DeviceRenderer renderer(
       device_, scene.volume,

@@ -21,6 +21,7 @@
 #include "core/render/device_renderer.hpp"
 #include "core/stages/ambient.hpp"
 #include "reference/random.hpp"
+#include "tests/api_support.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/ray_cases.hpp"
 #include "tests/run_program.hpp"
@@ -29,23 +30,13 @@
 namespace isowave::core {
 namespace {
 
+using test::error_of;
 using test::expect_same_hits;
 using test::TestVolume;
 using test::twin_hits;
 using testing::HasSubstr;
 
 constexpr ImageSize kOdd{23, 17};  // middle rows and columns run along axes
-
-template <class Call>
-std::string error_of(const Call &call) {
-  try {
-    call();
-  } catch (const isowave::Error &error) {
-    EXPECT_EQ(std::string_view(error.what()).find('\n'), std::string_view::npos);
-    return error.what();
-  }
-  return "no error";
-}
 
 /// Draws all isovalues from all cameras. Returns the number of hits.
 std::uint64_t check(const TestVolume &volume, const std::vector<Camera> &cameras,
@@ -68,12 +59,6 @@ std::uint64_t check(const TestVolume &volume, const std::vector<Camera> &cameras
     }
   }
   return hits;
-}
-
-std::vector<Camera> hard_cameras(const glm::uvec3 &dims) {
-  std::vector<Camera> cameras;
-  for (const CameraCase &c : camera_cases(dims)) cameras.push_back(c.camera);
-  return cameras;
 }
 
 TEST(HostRenderer, HardRaysThroughOddVolumes) {
@@ -163,133 +148,6 @@ TEST(HostRenderer, FilesAndMemoryGiveTheSame) {
     from_memory.render(request);
     expect_same_hits(from_file.hits(), from_memory.hits(), kOdd.width);
   }
-}
-
-/// The loops for any processor, and for this one.
-TEST(HostLoops, AllGiveTheSameBits) {
-  const auto reader = open_volume(ISOWAVE_TEST_DATA "/fuel_64x33x32_uint8.raw.gz");
-  const TestVolume volume(*reader, 6);
-  HostBlocks blocks(volume.compressed, HostBlocks::kNoLimit, 0);
-  blocks.select(10);
-  FrameParams frame =
-      make_frame_params(volume.info(), orbit_cameras(volume.info(), 1)[0], {64, 48}, 10);
-  const auto expected = render_scalar(frame, volume.voxels);
-  frame.surface = blocks.surface();
-  const ShadeParams shading = make_shade_params(volume.info(), {});
-  const Image8 picture = shade_scalar(frame, shading, expected);
-  const auto directions = make_ambient_directions(3);
-  const AmbientRays ambient{make_ambient_params(volume.info()), directions.data(), 3};
-  const std::vector<FrameParams> frames = {frame};
-  const std::vector<VolumeInfo> infos = {volume.info()};
-  const std::vector<std::vector<float>> voxels = {volume.voxels};
-  const std::vector<uchar> open = count_open(frames, infos, voxels, expected, 3);
-  std::vector<HitRecord> smooth = expected;
-  smooth_gradients(frame, volume.voxels, smooth);
-  for (const HostLoops &loops : all_host_loops()) {
-    std::vector<HitRecord> hits(64 * 48, no_hit());
-    for (const auto trace : {loops.trace, loops.trace_rays}) {
-      for (const bool is_smooth : {true, false}) {
-        std::ranges::fill(hits, no_hit());
-        EXPECT_EQ(trace(frame, blocks.field(), {0, 0, 64, 48}, is_smooth, hits.data()),
-                  test::num_hits(expected));
-        expect_same_hits(hits, is_smooth ? smooth : expected, 64);
-      }
-    }
-    std::vector<uchar> counts(64 * 48);
-    loops.ambient(frame, blocks.field(), {0, 0, 64, 48}, ambient, hits.data(), counts.data());
-    EXPECT_EQ(counts, open);
-    std::vector<std::uint8_t> row(3 * 64);
-    loops.shade(frame, shading, 1, 23, hits.data(), nullptr, 0, row.data());
-    EXPECT_EQ(std::memcmp(row.data(), picture.pixels.data() + 23 * row.size(), row.size()), 0);
-    std::size_t num_compared = 0;
-    for (std::uint32_t id = 0; id < volume.compressed.block_count(); ++id) {
-      if (!blocks.is_decoded(id)) continue;
-      ++num_compared;
-      float values[64];
-      loops.decode({volume.compressed.words.data(), volume.compressed.block_begin(id),
-                    volume.compressed.block_bits(id), volume.compressed.precision.min_exponent,
-                    false, 4, 4, 4, 0},
-                   values);
-      ASSERT_EQ(std::memcmp(values, blocks.field().values + 64 * id, sizeof(values)), 0) << id;
-      EXPECT_EQ(loops.inside(values, 10), host_loops().inside(values, 10));
-    }
-    EXPECT_GT(num_compared, 100u);
-  }
-}
-
-/// A tile that ends within packets of 4 x 2 rays: nothing beyond it is drawn, nothing missing.
-TEST(HostLoops, TilesOfAnySize) {
-  const glm::uvec3 dims(20, 21, 22);
-  const TestVolume volume(dims, test::gyroid_field(9), 8);
-  HostBlocks blocks(volume.compressed, HostBlocks::kNoLimit, 0);
-  blocks.select(0.2f);
-  FrameParams frame =
-      make_frame_params(volume.info(), orbit_cameras(volume.info(), 1)[0], {64, 48}, 0.2f);
-  const auto whole = render_scalar(frame, volume.voxels);
-  frame.surface = blocks.surface();
-  for (const RayTile tile : {RayTile{20, 15, 37, 32}, {21, 16, 22, 17}, {30, 20, 30, 20}}) {
-    std::vector<HitRecord> expected(whole.size(), no_hit()), hits = expected;
-    for (uint y = tile.begin_y; y < tile.end_y; ++y) {
-      for (uint x = tile.begin_x; x < tile.end_x; ++x) expected[x + 64 * y] = whole[x + 64 * y];
-    }
-    EXPECT_EQ(host_loops().trace(frame, blocks.field(), tile, false, hits.data()),
-              test::num_hits(expected));
-    expect_same_hits(hits, expected, 64);
-  }
-}
-
-/// Packets against rays alone: odd volumes, eyes anywhere, ties. ISOWAVE_FUZZ_RAYS: so many rays,
-/// instead of half a million.
-TEST(HostLoops, PacketsFindWhatRaysAloneFind) {
-  const char *asked = std::getenv("ISOWAVE_FUZZ_RAYS");
-  const std::uint64_t num_rays = asked != nullptr ? std::strtoull(asked, nullptr, 10) : 500'000;
-  const ImageSize size{41, 31};
-  Random random(17);
-  std::uint64_t rays = 0, num_hits = 0;
-  for (std::uint32_t volume_number = 0; rays < num_rays; ++volume_number) {
-    const auto dim = [&] { return static_cast<std::uint32_t>(random.in(2, 46)); };
-    const glm::uvec3 dims(dim(), dim(), dim());
-    const bool is_whole = volume_number % 3 == 1;
-    const TestVolume volume(dims,
-                            volume_number % 3 == 0 ? test::gyroid_field(random.in(6, 60))
-                            : is_whole             ? test::plateau_field()
-                                                   : test::noise_field(volume_number),
-                            16);
-    const float isovalue = is_whole ? volume.voxels[volume.voxels.size() / 2]
-                                    : static_cast<float>(random.in(-0.9, 0.9));
-    HostBlocks blocks(volume.compressed, HostBlocks::kNoLimit, 0);
-    blocks.select(isovalue);
-    std::vector<Camera> cameras = hard_cameras(dims);
-    const glm::dvec3 extent = glm::dvec3(dims) - 1.0;
-    const auto anywhere = [&](double margin) {
-      return extent * glm::dvec3(random.in(-margin, 1 + margin), random.in(-margin, 1 + margin),
-                                 random.in(-margin, 1 + margin));
-    };
-    for (int i = 0; i < 8; ++i) {
-      const glm::dvec3 eye = anywhere(i < 4 ? 0 : 2);
-      cameras.push_back(test::camera_along(i % 2 == 0 ? glm::round(eye) : eye,
-                                           anywhere(0) + glm::dvec3(0.01, 0.02, 0.03) - eye,
-                                           {0.3, 1, 0.2}, random.in(2, 110)));
-    }
-    for (std::size_t view = 0; view < cameras.size(); ++view, rays += size.num_rays()) {
-      FrameParams frame = make_frame_params(volume.info(), cameras[view], size, isovalue);
-      frame.surface = blocks.surface();
-      std::vector<HitRecord> expected(size.num_rays(), no_hit()), hits = expected;
-      const RayTile all = {0, 0, size.width, size.height};
-      num_hits += host_loops().trace_rays(frame, blocks.field(), all, false, expected.data());
-      for (const HostLoops &loops : all_host_loops()) {
-        if (loops.trace == loops.trace_rays) continue;
-        hits.assign(size.num_rays(), no_hit());
-        loops.trace(frame, blocks.field(), all, false, hits.data());
-        expect_same_hits(hits, expected, size.width);
-      }
-      ASSERT_FALSE(HasFailure()) << fmt::format("volume {} ({}x{}x{}), isovalue {}, view {}",
-                                                volume_number, dims.x, dims.y, dims.z, isovalue,
-                                                view);
-    }
-  }
-  RecordProperty("rays", std::to_string(rays));
-  EXPECT_GT(num_hits, rays / 20);
 }
 
 TEST(HostRenderer, BandsGrowFromTheTopAndCanBeStopped) {
@@ -534,131 +392,6 @@ TEST(HostRenderer, RequestsThatFailAreOneLine) {
   EXPECT_THAT(error_of([&] { renderer.camera({&nan, 1}, kOdd); }), HasSubstr("NaN"));
 }
 
-std::shared_ptr<const Volume> public_volume() {
-  return isowave::open_volume(ISOWAVE_TEST_DATA "/fuel_64x33x32_uint8.raw.gz",
-                              {.tolerance = 0.5, .levels = 0});
-}
-
-isowave::FrameRequest public_request(const Camera &camera) {
-  return {.camera = {{camera.eye.x, camera.eye.y, camera.eye.z},
-                     {camera.at.x, camera.at.y, camera.at.z},
-                     {camera.up.x, camera.up.y, camera.up.z},
-                     camera.fovy_deg},
-          .isovalue = 10,
-          .size = {64, 48, 2},
-          .want_depth = true,
-          .want_normals = true,
-          .want_hits = true};
-}
-
-TEST(ApiHostRenderer, RefusesInOneLineWhatDevicesAloneCan) {
-  isowave::Renderer renderer = isowave::make_host_renderer(public_volume());
-  const isowave::FrameRequest good{.camera = renderer.camera(10), .isovalue = 10, .size = {64, 48}};
-  EXPECT_TRUE(renderer.can_draw(good));
-  const std::vector<std::uint8_t> picture = renderer.render(good).picture;
-  const auto expect_error = [&](const char *text, const auto &change) {
-    isowave::FrameRequest bad = good;
-    change(bad);
-    EXPECT_THAT(error_of([&] { renderer.render(bad); }), HasSubstr(text));
-    EXPECT_FALSE(renderer.can_draw(bad)) << text;
-    EXPECT_EQ(renderer.render(good).picture, picture) << text;
-  };
-  using Request = isowave::FrameRequest;
-  expect_error("leave out voxel_pixels", [](Request &r) { r.voxel_pixels = 1; });
-  expect_error("leave out voxel_error", [](Request &r) { r.voxel_error = 1; });
-  expect_error("leave out bound", [](Request &r) { r.bound = isowave::FieldBound::kLower; });
-  expect_error("leave out max_surface_error", [](Request &r) { r.max_surface_error = 1; });
-  expect_error("leave out want_bounds", [](Request &r) { r.want_bounds = true; });
-  expect_error("leave out time_budget_ms", [](Request &r) { r.time_budget_ms = 1; });
-  EXPECT_THAT(error_of([] { isowave::make_host_renderer(nullptr); }), HasSubstr("needs a volume"));
-  EXPECT_THAT(
-      error_of([] { isowave::make_host_renderer(public_volume(), {.memory_limit = 1000}); }),
-      HasSubstr("raise the limit"));
-}
-
-TEST(ApiHostRenderer, CastRaysInTheWorld) {
-  Grid grid{.dims = {21, 21, 21}, .spacing = {1, 2, 3}, .origin = {5, 6, 7}};
-  std::vector<float> voxels;
-  for (int i = 0; i < 21 * 21 * 21; ++i) voxels.push_back(static_cast<float>(i / 441));  // z
-  isowave::Renderer renderer =
-      isowave::make_host_renderer(compress(voxels, grid, {.tolerance = 1e-4}));
-  // The surface is the plane z = 7 + 3 * 10.5.
-  const std::vector<isowave::Ray> rays = {{{10, 20, 0}, {0, 0, 1}},
-                                          {{10, 20, 0}, {0, 0, 10}},
-                                          {{10, 20, 100}, {0.25, 0.25, -2}},
-                                          {{10, 20, 0}, {0, 0, -1}},
-                                          {{100, 20, 0}, {0, 0, 1}}};
-  const Frame hits = renderer.cast_rays(rays, 10.5f);
-  ASSERT_EQ(hits.rows, 1u);
-  ASSERT_EQ(hits.columns, 5u);
-  for (std::size_t i = 0; i < 3; ++i) {
-    const double t = (38.5 - rays[i].origin[2]) / rays[i].direction[2];
-    EXPECT_NEAR(hits.depth[i], t, 1e-3 * t);
-    EXPECT_NEAR(hits.positions[i][2], 38.5, 1e-3);
-    EXPECT_NEAR(hits.positions[i][0], rays[i].origin[0] + t * rays[i].direction[0], 1e-3);
-    EXPECT_NEAR(hits.normals[i][2], -1, 1e-3);
-    EXPECT_EQ(hits.hits[i].cell[2], 10u);
-  }
-  for (std::size_t i = 3; i < 5; ++i) {
-    EXPECT_TRUE(std::isinf(hits.depth[i]));
-    EXPECT_TRUE(std::isnan(hits.positions[i][0]));
-  }
-  EXPECT_THAT(error_of([&] { renderer.cast_rays(std::vector<isowave::Ray>(1), 1); }),
-              HasSubstr("direction"));
-}
-
-TEST(ApiHostRenderer, FramesCanBeWatchedAndStopped) {
-  isowave::Renderer renderer = isowave::make_host_renderer(public_volume(), {.num_threads = 1});
-  isowave::FrameRequest request{.camera = renderer.camera(10), .isovalue = 10, .size = {128, 96}};
-  const Frame whole = renderer.render(request);
-  EXPECT_EQ(whole.statistics.passes, 1u);
-  std::vector<std::uint8_t> last;
-  std::uint32_t passes = 0;
-  request.on_pass = [&](const isowave::Progress &progress) {
-    EXPECT_EQ(progress.passes(), ++passes);
-    last = progress.picture();
-    return true;
-  };
-  EXPECT_EQ(renderer.render(request).picture, whole.picture);
-  EXPECT_EQ(last, whole.picture);
-  EXPECT_EQ(passes, 6u);
-  request.on_pass = [](const isowave::Progress &progress) {
-    return progress.completed_percent() < 50;
-  };
-  const Frame stopped = renderer.render(request);
-  EXPECT_TRUE(stopped.statistics.cancelled);
-  EXPECT_FALSE(stopped.statistics.complete);
-  EXPECT_EQ(stopped.statistics.passes, 3u);
-  EXPECT_NE(stopped.picture, whole.picture);
-  const std::size_t half = whole.picture.size() / 2;
-  EXPECT_TRUE(std::equal(whole.picture.begin(), whole.picture.begin() + std::ptrdiff_t(half),
-                         stopped.picture.begin()));
-}
-
-TEST(ApiHostRenderer, ThreadsShareARenderer) {
-  isowave::Renderer renderer = isowave::make_host_renderer(public_volume());
-  std::vector<isowave::FrameRequest> requests;
-  std::vector<std::vector<float>> depths;
-  for (const float isovalue : {10.0f, 60.0f}) {
-    requests.push_back({.camera = renderer.camera(isovalue),
-                        .isovalue = isovalue,
-                        .size = {64, 48},
-                        .want_depth = true});
-    depths.push_back(renderer.render(requests.back()).depth);
-  }
-  EXPECT_NE(depths[0], depths[1]);
-  std::atomic<int> num_equal = 0;
-  std::vector<std::jthread> threads;
-  for (std::size_t i = 0; i < 4; ++i) {
-    threads.emplace_back([&, i] {
-      for (int frame = 0; frame < 5; ++frame)
-        num_equal += renderer.render(requests[i % 2]).depth == depths[i % 2];
-    });
-  }
-  threads.clear();
-  EXPECT_EQ(num_equal, 20);
-}
-
 class HostRendererOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {};
 INSTANTIATE_TEST_SUITE_P(Devices, HostRendererOnDevice, testing::ValuesIn(devices_under_test()),
                          device_test_name);
@@ -677,12 +410,12 @@ TEST_P(HostRendererOnDevice, SmallFramesAreTheDevices) {
 }
 
 TEST_P(HostRendererOnDevice, WholeFramesAreThoseOfTheFrontDoor) {
-  const auto volume = public_volume();
+  const auto volume = test::public_volume();
   isowave::Renderer renderer(isowave::open_device(std::to_string(GetParam().index)), volume,
                              {.largest = {64, 48, 2}, .with_levels = true});
   isowave::Renderer host = isowave::make_host_renderer(volume);
   const isowave::FrameRequest request =
-      public_request(orbit_cameras(test::grid_info({64, 33, 32}), 1)[0]);
+      test::public_request(orbit_cameras(test::grid_info({64, 33, 32}), 1)[0]);
   const Frame expected = renderer.render(request), got = host.render(request);
   EXPECT_GT(expected.statistics.hits, 1000u);
   EXPECT_EQ(got.statistics.hits, expected.statistics.hits);

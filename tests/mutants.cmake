@@ -139,7 +139,7 @@ add_device_mutant(own_voxels_only "rays;packets;blocks" macrocells.cl
 add_device_mutant(half_of_macrocells "rays;blocks" device/block_walk.h
   "(bit < 32 ? low >> bit : high >> (bit - 32)) & 1u" "(bit < 32 ? low >> bit : 0u) & 1u")
 add_device_mutant(lost_results blocks device/closest_pair.h "atomic_min(" "atomic_max(")
-add_device_mutant(half_of_blocks packets portable/packet_walk.h
+add_device_mutant(half_of_blocks packets portable/packet_regions.h
   "pick(level->place < 32, level->low, level->high)"
   "pick(level->place < 32, level->low, ints(0))")
 add_device_mutant(one_crossing_of_packets packets portable/packet_walk.h

@@ -1,5 +1,5 @@
-// Voxels without data: no surface touches them, in no renderer and no mesh; what they are stored as
-// does not spoil their neighbours.
+// Voxels without data: no surface touches them, in no renderer; what they are stored as does not
+// spoil their neighbours. no_data_levels_test.cpp and no_data_meshes_test.cpp have the rest.
 
 #include "core/zfp/no_data.hpp"
 
@@ -10,28 +10,19 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <functional>
 #include <limits>
-#include <map>
-#include <set>
 #include <string>
 #include <vector>
 
 #include "core/accuracy/certify.hpp"
 #include "core/base/error.hpp"
-#include "core/extract/extractor.hpp"
 #include "core/host/host_renderer.hpp"
-#include "core/paper/mesh_renderer.hpp"
 #include "core/render/device_renderer.hpp"
-#include "core/zfp/level_bounds.hpp"
-#include "core/zfp/stated_errors.hpp"
 #include "core/zfp/voxel_region.hpp"
 #include "core/zfp/zfp_file.hpp"
-#include "reference/mesh_twin.hpp"
-#include "reference/raster_twin.hpp"
 #include "reference/twin.hpp"
 #include "tests/frame_scene.hpp"
-#include "tests/mesh_checks.hpp"
+#include "tests/no_data_volumes.hpp"
 #include "tests/run_program.hpp"
 #include "tests/stage_support.hpp"
 #include "tests/test_pipelines.hpp"
@@ -40,60 +31,17 @@
 namespace isowave::core {
 namespace {
 
+using test::compressed;
 using test::expect_same_hits;
+using test::Hole;
+using test::holes;
+using test::kNone;
+using test::NamedHole;
 using test::num_hits;
 using test::TestVolume;
+using test::with_hole;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
-
-constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
-
-/// Says of a voxel whether it has no data.
-using Hole = std::function<bool(const glm::uvec3 &at)>;
-
-std::vector<float> with_hole(const glm::uvec3 &dims, std::vector<float> voxels, const Hole &hole,
-                             float value = kNone) {
-  std::size_t i = 0;
-  for (std::uint32_t z = 0; z < dims.z; ++z) {
-    for (std::uint32_t y = 0; y < dims.y; ++y) {
-      for (std::uint32_t x = 0; x < dims.x; ++x, ++i) {
-        if (hole({x, y, z})) voxels[i] = value;
-      }
-    }
-  }
-  return voxels;
-}
-
-struct NamedHole {
-  const char *name;
-  Hole hole;
-};
-
-/// Holes of a volume of dims.
-std::vector<NamedHole> holes(const glm::uvec3 &dims) {
-  const auto scattered = [dims](const glm::uvec3 &at) {
-    const std::uint32_t number = at.x + dims.x * (at.y + dims.y * at.z);
-    return (number * 2654435761u >> 16) % 23 == 0;
-  };
-  return {{"half", [=](const glm::uvec3 &at) { return at.x > dims.x / 2; }},
-          {"a voxel", [=](const glm::uvec3 &at) { return at == dims / 2u; }},
-          {"scattered", scattered},
-          {"all", [](const glm::uvec3 &) { return true; }},
-          {"the border",
-           [=](const glm::uvec3 &at) {
-             return at.x == 0 || at.y == 0 || at.z == 0 || at.x + 1 == dims.x ||
-                    at.y + 1 == dims.y || at.z + 1 == dims.z;
-           }},
-          {"partial blocks", [=](const glm::uvec3 &at) {
-             return at.x / 4 == (dims.x - 1) / 4 || at.z / 4 == (dims.z - 1) / 4;
-           }}};
-}
-
-CompressedVolume compressed(const glm::uvec3 &dims, const std::vector<float> &voxels,
-                            const CompressOptions &options = {.rate = 12}) {
-  ArrayReader reader(dims, voxels);
-  return compress(reader, options);
-}
 
 TEST(NoData, TableHasTheMasks) {
   Random random(3);
@@ -368,176 +316,6 @@ TEST_P(NoDataFrames, SmallNormalsIgnoreThem) {
   }
 }
 
-// ---- Levels of detail
-
-/// Voxels of each level without data, [nz][ny][nx] one level after the other; the finest first.
-std::vector<std::vector<float>> decoded_levels(const CompressedVolume &volume) {
-  std::vector<std::vector<float>> levels = {decode_with_libzfp(volume)};
-  for (const CompressedVolume &level : volume.coarser_levels)
-    levels.push_back(decode_with_libzfp(level));
-  return levels;
-}
-
-/// At no level do data reach beyond their border; gaps of one voxel close, wider ones stay in their
-/// place.
-TEST(NoData, LevelsKeepBordersAndCloseSmallGaps) {
-  const glm::uvec3 dims(48, 40, 36);
-  const std::vector<float> source = test::sample(dims, test::gyroid_field(9));
-  struct Case {
-    const char *name;
-    Hole hole;
-    std::uint32_t gap_begin, gap_end;  ///< along x; of the finest level
-  };
-  for (const Case &of :
-       {Case{"half", [](const glm::uvec3 &at) { return at.x > 25; }, 26, 99},
-        Case{"a voxel", [](const glm::uvec3 &at) { return at == glm::uvec3(16, 8, 8); }, 99, 99},
-        Case{"a plane", [](const glm::uvec3 &at) { return at.x == 16; }, 99, 99},
-        Case{"a wide gap", [](const glm::uvec3 &at) { return at.x >= 7 && at.x < 33; }, 7, 33}}) {
-    SCOPED_TRACE(of.name);
-    const CompressedVolume volume =
-        compressed(dims, with_hole(dims, source, of.hole), {.rate = 16, .levels = 0});
-    ASSERT_EQ(volume.coarser_levels.size(), 3u);
-    const std::vector<std::vector<float>> levels = decoded_levels(volume);
-    for (std::uint32_t level = 1; level < levels.size(); ++level) {
-      const glm::uvec3 &size = volume.coarser_levels[level - 1].info.dims;
-      for (std::size_t i = 0; i < levels[level].size(); ++i) {
-        const std::uint32_t x = static_cast<std::uint32_t>(i % size.x) << level;
-        const bool missing = x >= of.gap_begin && x < of.gap_end;
-        ASSERT_EQ(std::isnan(levels[level][i]), missing) << "level " << level << ", voxel " << i;
-        ASSERT_TRUE(missing || std::abs(levels[level][i]) < 4) << levels[level][i];
-      }
-    }
-  }
-}
-
-/// The value that says "no data", and the one that replaces NaN, are those of the source alone.
-TEST(NoData, LevelsTakeNoMeanForThatValue) {
-  const glm::uvec3 dims(16, 16, 16);
-  const std::vector<float> waves =
-      test::sample(dims, [](const glm::dvec3 &at) { return int(at.x) / 2 % 2 == 0 ? 8 : -8; });
-  std::vector<float> source = with_hole(
-      dims, waves, [](const glm::uvec3 &at) { return at.y > 7; }, 0);
-  source[0] = kNone;
-  const CompressedVolume volume =
-      compressed(dims, source, {.rate = 24, .levels = 2, .input = {.map_nan = 8.0f, .no_data = 0}});
-  EXPECT_EQ(volume.no_data.num_voxels(), 16u * 16 * 8);
-  EXPECT_EQ(volume.coarser_levels[0].no_data.num_voxels(), 9u * 9 * 5);
-}
-
-TEST(NoData, FilesKeepThoseOfLevels) {
-  const glm::uvec3 dims(30, 17, 22);
-  const std::vector<float> source = test::sample(dims, test::gyroid_field(9));
-  const test::TemporaryFolder folder;
-  const std::filesystem::path path = folder / "a.zfp", at_once = folder / "b.zfp";
-  for (const NamedHole &hole : holes(dims)) {
-    for (const CompressOptions &options :
-         {CompressOptions{.rate = 12, .measure_error = true, .levels = 0},
-          CompressOptions{.precision = BlockPrecision{.min_exponent = -8}, .levels = 0}}) {
-      SCOPED_TRACE(hole.name);
-      const std::vector<float> holed = with_hole(dims, source, hole.hole);
-      const CompressedVolume volume = compressed(dims, holed, options);
-      write_zfp_file(volume, path);
-      ArrayReader reader(dims, holed);
-      compress_to_file(reader, options, at_once);
-      EXPECT_EQ(test::read_file(path), test::read_file(at_once));
-      const CompressedVolume read = read_zfp_file(path);
-      check_stated_errors(read, {});
-      for (std::size_t i = 0; i < volume.coarser_levels.size(); ++i) {
-        EXPECT_TRUE(std::ranges::equal(read.coarser_levels[i].no_data.table(),
-                                       volume.coarser_levels[i].no_data.table()));
-        EXPECT_LE(double{largest_bound(volume.coarser_levels[i].bounds)}, 3.0)
-            << "bounds are those of voxels with data";
-      }
-    }
-  }
-}
-
-class NoDataLevels : public testing::TestWithParam<ocl::DeviceInfo> {
- protected:
-  static constexpr ImageSize kSize{48, 32};
-
-  /// Returns the number of hits.
-  std::uint64_t check(const CompressedVolume &volume, float isovalue, double voxel_pixels,
-                      StreamPlace place = StreamPlace::kDevice) {
-    DeviceRenderer renderer(device_, volume, {.size = kSize, .stream = place, .with_levels = true});
-    EXPECT_EQ(device_.ledger().current(), renderer.memory_plan().total());
-    const Twin twin(volume, voxel_pixels);
-    std::vector<Camera> cameras = orbit_cameras(volume.info, 2);
-    cameras.push_back(test::camera_along({5, 6, 7}, {1, 0.4, -0.3}));  // from within
-    std::uint64_t hits = 0;
-    for (const Camera &camera : cameras) {
-      const auto frames =
-          make_level_frames(level_infos(volume, true), camera, kSize, isovalue, voxel_pixels);
-      EXPECT_GT(std::ranges::count_if(frames, draws), 1) << "no border is tested";
-      const auto expected = twin.render(camera, kSize, isovalue);
-      renderer.render({.camera = camera, .isovalue = isovalue, .voxel_pixels = voxel_pixels});
-      expect_same_hits(renderer.hits(), expected, kSize.width);
-      hits += num_hits(expected);
-    }
-    return hits;
-  }
-
-  ocl::Device device_{GetParam()};
-};
-INSTANTIATE_TEST_SUITE_P(Devices, NoDataLevels, testing::ValuesIn(devices_under_test()),
-                         device_test_name);
-
-CompressedVolume pyramid_of(const glm::uvec3 &dims, const test::VoxelFunction &field,
-                            const Hole &hole) {
-  return compressed(dims, with_hole(dims, test::sample(dims, field), hole),
-                    {.rate = 12, .levels = 0});
-}
-
-TEST_P(NoDataLevels, SmallBandsHaveTheTwinsBits) {
-  const glm::uvec3 dims(24, 22, 19);
-  std::uint64_t hits = 0;
-  for (const auto &field : {test::gyroid_field(9), test::noise_field(5)}) {
-    for (const NamedHole &hole : holes(dims)) {
-      if (is_llvmpipe(GetParam()) && !long_tests() && hole.name[0] != 's') continue;
-      SCOPED_TRACE(hole.name);
-      const CompressedVolume volume = pyramid_of(dims, field, hole.hole);
-      hits += check(volume, 0.25f, 2.5);
-      hits += check(volume, 0.0f, 5.0, StreamPlace::kHost);
-    }
-  }
-  EXPECT_GT(hits, 1000u);
-}
-
-/// Where a level ends in cells without data, no side is carried to the next: else each border would
-/// be a surface.
-TEST_P(NoDataLevels, SmallGapsAtBordersAreNoHits) {
-  const glm::uvec3 dims(24, 22, 19);
-  for (const NamedHole &hole : holes(dims)) {
-    SCOPED_TRACE(hole.name);
-    const auto inside = [](const glm::dvec3 &) { return 1; };
-    for (const double voxel_pixels : {2.0, 4.0})
-      EXPECT_EQ(check(pyramid_of(dims, inside, hole.hole), 0.5f, voxel_pixels), 0u);
-  }
-}
-
-/// Blocks that are as a whole on one side, of levels that contradict each other, and are without
-/// data in other places.
-TEST_P(NoDataLevels, SmallSidesOfWholeBlocksNeedData) {
-  const glm::uvec3 dims(40, 37, 33);
-  const auto ball = [](float inner, float outer) {
-    return [=](const glm::dvec3 &at) {
-      return glm::distance(at, glm::dvec3(30, 20, 20)) < 9 ? inner : outer;
-    };
-  };
-  const auto in_layers = [](std::uint32_t axis, std::uint32_t period) {
-    return [=](const glm::uvec3 &at) {
-      return at[static_cast<glm::length_t>(axis)] / (period / 2) % 2 == 0;
-    };
-  };
-  CompressedVolume volume = pyramid_of(dims, ball(1, 0), in_layers(0, 12));
-  volume.coarser_levels = pyramid_of(dims, ball(0, 1), in_layers(1, 14)).coarser_levels;
-  EXPECT_GT(check(volume, 0.5f, 2.5), 100u);
-  const CompressedVolume scattered = pyramid_of(dims, ball(1, 0), holes(dims)[2].hole);
-  volume = pyramid_of(dims, ball(0, 1), holes(dims)[0].hole);
-  volume.coarser_levels = scattered.coarser_levels;
-  EXPECT_GT(check(volume, 0.5f, 2.5), 100u);
-}
-
 // ---- Bounds of a frame's error
 
 class NoDataBounds : public testing::TestWithParam<ocl::DeviceInfo> {};
@@ -600,112 +378,6 @@ TEST_P(NoDataBounds, SmallCertainPixelsAreRight) {
   EXPECT_GT(hits, 1000u);
   EXPECT_GT(misses, 1000u);
   EXPECT_GT(uncertain, 1000u);
-}
-
-// ---- Meshes
-
-class NoDataMeshes : public testing::TestWithParam<ocl::DeviceInfo> {};
-INSTANTIATE_TEST_SUITE_P(Devices, NoDataMeshes, testing::ValuesIn(devices_under_test()),
-                         device_test_name);
-
-/// The triangles of a whole volume's mesh, as sets of corners, whose cell has data.
-std::multiset<std::vector<float>> triangles_with_data(const Mesh &mesh, const glm::uvec3 &dims,
-                                                      const Hole &hole) {
-  std::multiset<std::vector<float>> kept;
-  for (const Triangle &triangle : mesh.triangles) {
-    std::vector<float> corners;
-    glm::vec3 middle(0);
-    for (const std::uint32_t vertex : triangle) {
-      const glm::vec3 at = mesh.vertices[vertex];
-      middle += at / 3.0f;
-      corners.insert(corners.end(), {at.x, at.y, at.z});
-    }
-    const glm::uvec3 cell(glm::floor(middle));
-    bool has_data = true;
-    for (std::uint32_t corner = 0; corner < 8; ++corner) {
-      const glm::uvec3 at = cell + glm::uvec3(corner & 1, corner >> 1 & 1, corner >> 2);
-      has_data = has_data && !hole(glm::min(at, dims - 1u));
-    }
-    if (has_data) kept.insert(corners);
-  }
-  return kept;
-}
-
-/// What is left of the whole volume's mesh: it ends with an open border, and no vertex is left
-/// over.
-TEST_P(NoDataMeshes, SmallHolesAreCutOutOfTheMesh) {
-  const glm::uvec3 dims(17, 14, 13);
-  std::vector<float> source = test::sample(dims, test::noise_field(9));
-  for (float &voxel : source) voxel = std::round(voxel * 100);  // exact with and without holes
-  VolumeInfo info = test::grid_info(dims);
-  info.type = VoxelType::kInt8;
-  ocl::Device device(GetParam());
-  const TestVolume whole(info, source, {.exact = true});
-  const float isovalue = 10.5f;
-  const Mesh all = extract_scalar(whole.compressed, isovalue);
-  const Hole none = [](const glm::uvec3 &) { return false; };
-  ASSERT_EQ(triangles_with_data(all, dims, none).size(), all.triangles.size());
-  for (const NamedHole &hole : holes(dims)) {
-    SCOPED_TRACE(hole.name);
-    const TestVolume volume(info, with_hole(dims, source, hole.hole), {.exact = true});
-    for (const StreamPlace place : {StreamPlace::kDevice, StreamPlace::kHost}) {
-      Extractor extractor(device, volume.compressed, {.stream = place});
-      Mesh mesh;
-      extractor.extract(isovalue, mesh);
-      expect_same_mesh(mesh, extract_scalar(volume.compressed, isovalue));
-      EXPECT_EQ(triangles_with_data(mesh, dims, none), triangles_with_data(all, dims, hole.hole));
-      std::set<std::uint32_t> used;
-      for (const Triangle &triangle : mesh.triangles) used.insert(triangle.begin(), triangle.end());
-      EXPECT_EQ(used.size(), mesh.vertices.size());
-    }
-  }
-}
-
-TEST_P(NoDataMeshes, SmallDrawnTrianglesHaveTheTwinsBits) {
-  const glm::uvec3 dims(17, 14, 13);
-  constexpr ImageSize kSize{48, 32};
-  ocl::Device device(GetParam());
-  for (const NamedHole &hole : holes(dims)) {
-    SCOPED_TRACE(hole.name);
-    const TestVolume volume(test::grid_info(dims),
-                            with_hole(dims, test::sample(dims, test::gyroid_field(9)), hole.hole),
-                            16);
-    MeshRenderer renderer(device, volume.compressed, {.size = kSize});
-    const Camera camera = orbit_cameras(volume.info(), 3)[2];
-    renderer.render({camera, 0.25f});
-    expect_same_hits(renderer.hits(),
-                     rasterise_scalar(make_frame_params(volume.info(), camera, kSize, 0.25f),
-                                      triangles_scalar(dims, volume.voxels, 0.25f)),
-                     kSize.width);
-  }
-}
-
-/// The device's memory without them is what it was; programs built for them draw other volumes.
-TEST_P(NoDataMeshes, SmallOtherVolumesAreDrawnAsBefore) {
-  const glm::uvec3 dims(17, 14, 13);
-  constexpr ImageSize kSize{24, 16};
-  const std::vector<float> source = test::sample(dims, test::gyroid_field(9));
-  const TestVolume full(test::grid_info(dims), source, 12),
-      holed(test::grid_info(dims), with_hole(dims, source, holes(dims)[2].hole), 12);
-  ocl::Device device(GetParam());
-  const Camera camera = orbit_cameras(full.info(), 3)[2];
-  const auto expected = test::twin_hits(full, camera, kSize, 0.25f);
-  std::uint64_t bytes = 0;
-  for (int turn = 0; turn < 2; ++turn) {
-    DeviceRenderer renderer(device, full.compressed, {.size = kSize});
-    renderer.render({camera, 0.25f});
-    expect_same_hits(renderer.hits(), expected, kSize.width);
-    if (turn == 0) bytes = device.ledger().current();
-    EXPECT_EQ(device.ledger().current(), bytes);
-    DeviceRenderer other(device, holed.compressed, {.size = kSize});
-    EXPECT_EQ(device.ledger().current(), 2 * bytes + holed.compressed.no_data.table().size_bytes());
-  }
-  ocl::DeviceInfo without = GetParam();
-  without.capabilities.nan = false;
-  ocl::Device plain(without);
-  EXPECT_NO_THROW(DeviceRenderer(plain, full.compressed, {.size = kSize}));
-  EXPECT_THAT([&] { DeviceRenderer(plain, holed.compressed, {.size = kSize}); },
-              ThrowsMessage<Error>(HasSubstr("has no NaN")));
 }
 
 }  // namespace

@@ -9,11 +9,13 @@
 #include <mutex>
 
 #include "core/api/device_implementation.hpp"
+#include "tests/api_support.hpp"
 #include "tests/test_devices.hpp"
 
 namespace isowave {
 namespace {
 
+using core::test::error_of;
 using testing::HasSubstr;
 
 constexpr ImageSize kSize{128, 96};
@@ -41,17 +43,6 @@ class QuickRendererOnDevice : public testing::TestWithParam<core::ocl::DeviceInf
 };
 INSTANTIATE_TEST_SUITE_P(Devices, QuickRendererOnDevice,
                          testing::ValuesIn(core::devices_under_test()), core::device_test_name);
-
-template <class Call>
-std::string error_of(const Call &call) {
-  try {
-    call();
-  } catch (const Error &error) {
-    EXPECT_EQ(std::string_view(error.what()).find('\n'), std::string_view::npos);
-    return error.what();
-  }
-  return "no error";
-}
 
 TEST_P(QuickRendererOnDevice, TheHostDrawsUntilTheDeviceIsReady) {
   std::unique_lock busy = busy_device();

@@ -84,4 +84,10 @@ inline std::vector<uint> blocks_of_ray(const FrameParams &frame, uint pixel) {
   return blocks;
 }
 
+inline std::vector<Camera> hard_cameras(const glm::uvec3 &dims) {
+  std::vector<Camera> cameras;
+  for (const CameraCase &c : camera_cases(dims)) cameras.push_back(c.camera);
+  return cameras;
+}
+
 }  // namespace isowave::core

@@ -248,6 +248,19 @@ std::vector<std::uint64_t> rays_of_which(const CompressedVolume &volume, bool wi
   return bits;
 }
 
+/// How far a pixel's hit may be off [pixels], kNotCertain if it may lie beyond the ray's way.
+///
+/// t            drawn
+/// first, last  between those of the two frames, the true one is
+/// way          of the ray through the volume
+float bound_of_hit(double t, double first, double last, const std::array<double, 2> &way,
+                   double cell_rounding, double pixel_size) {
+  if (first < way[0] || last > way[1]) return kNotCertain;
+  const double rounding = kDistanceRounding * last + cell_rounding;
+  const double distance = std::max(t - first, last - t) + rounding;
+  return std::nextafter(static_cast<float>(distance / pixel_size), kNotCertain);
+}
+
 }  // namespace
 
 Certificate certify(Renderer &renderer, const CompressedVolume &volume, const FrameRequest &request,
@@ -315,18 +328,14 @@ Certificate certify(Renderer &renderer, const CompressedVolume &volume, const Fr
     const auto first = static_cast<std::uint32_t>(row * size.ray_columns());
     for (std::uint32_t pixel = first; pixel < first + size.ray_columns(); ++pixel) {
       if ((uncertain[pixel / 64] >> pixel % 64 & 1) != 0) continue;
-      const double t = double{drawn[pixel]}, first_t = double{std::min(lower[pixel], upper[pixel])},
-                   last_t = double{std::max(lower[pixel], upper[pixel])};
+      const double t = double{drawn[pixel]};
+      const auto [first_t, last_t] = std::minmax({double{lower[pixel]}, double{upper[pixel]}});
       float &bound = certificate.bounds[pixel];
       if (std::isinf(t) && std::isinf(first_t)) {
         bound = 0;
       } else if (std::isfinite(t) && std::isfinite(last_t)) {
-        const std::array<double, 2> way = way_through(level_frames[0], pixel);
-        if (first_t < way[0] || last_t > way[1]) continue;
-        const double rounding = kDistanceRounding * last_t + cell_rounding;
-        const double distance = std::max(t - first_t, last_t - t) + rounding;
-        const double pixel_size = pixel_size_at(request.camera, size.height, t);
-        bound = std::nextafter(static_cast<float>(distance / pixel_size), kNotCertain);
+        bound = bound_of_hit(t, first_t, last_t, way_through(level_frames[0], pixel), cell_rounding,
+                             pixel_size_at(request.camera, size.height, t));
       }
     }
   });

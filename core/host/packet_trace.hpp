@@ -15,7 +15,7 @@ namespace isowave::core::ISO_PACKET_NAMESPACE {
 
 static_assert(kDefaultSolver.kind == ISO_SOLVER_BERNSTEIN, "there is no other here");
 
-// ---- The source of blocks: see packet_walk.h.
+// ---- The source of blocks: see packet_regions.h.
 
 using PacketField = HostField;
 

@@ -1,7 +1,9 @@
 // isowave._core: volumes and meshes.
 
+#include <nanobind/stl/tuple.h>
 #include <algorithm>
 #include <array>
+#include <tuple>
 
 #include "module.hpp"
 
@@ -23,6 +25,14 @@ std::string type_name(isowave::VoxelType type) {
   return kTypeNames.at(static_cast<std::size_t>(type));
 }
 
+/// Where an array's voxels are, and their type: dims, spacing, origin, direction as isowave::Grid.
+using PyGrid = std::tuple<std::string, Index3, Vector3, Vector3, std::array<Vector3, 3>>;
+
+isowave::Grid grid_of(const PyGrid &grid) {
+  const auto &[type, dims, spacing, origin, direction] = grid;
+  return {dims, spacing, origin, direction};
+}
+
 /// Reports to `progress`, if there is one, and looks for signals.
 void report_to(Callbacks &callbacks, const std::optional<nb::callable> &progress,
                isowave::Compression &compression) {
@@ -34,10 +44,8 @@ void report_to(Callbacks &callbacks, const std::optional<nb::callable> &progress
   };
 }
 
-PyVolume compress(const nb::callable &read, const std::string &type, const Index3 &dims,
-                  const Vector3 &spacing, const Vector3 &origin,
-                  const std::array<Vector3, 3> &direction, const nb::dict &options, bool keep,
-                  const std::optional<std::filesystem::path> &path,
+PyVolume compress(const nb::callable &read, const PyGrid &voxels, const nb::dict &options,
+                  bool keep, const std::optional<std::filesystem::path> &path,
                   const std::optional<nb::callable> &progress) {
   Callbacks callbacks;
   isowave::Compression compression = compression_of(options);
@@ -56,26 +64,25 @@ PyVolume compress(const nb::callable &read, const std::string &type, const Index
     if (!goes_on) throw Stopped();
   };
   return callbacks.without_gil([&] {
-    const isowave::Grid grid{dims, spacing, origin, direction};
+    const isowave::Grid grid = grid_of(voxels);
     const isowave::ReadLayers read_all = read_layers;
-    const isowave::VoxelType voxels = voxel_type(type);
-    return PyVolume{
-        path ? isowave::compress_to_file(read_all, voxels, grid, *path, compression, keep)
-             : isowave::compress(read_all, voxels, grid, compression, keep)};
+    const isowave::VoxelType type = voxel_type(std::get<0>(voxels));
+    return PyVolume{path ? isowave::compress_to_file(read_all, type, grid, *path, compression, keep)
+                         : isowave::compress(read_all, type, grid, compression, keep)};
   });
 }
 
 PyVolume compress_array(const nb::ndarray<nb::ro, nb::c_contig, nb::device::cpu> &array,
-                        const std::string &type, const Index3 &dims, const Vector3 &spacing,
-                        const Vector3 &origin, const std::array<Vector3, 3> &direction,
-                        const nb::dict &options, const std::optional<nb::callable> &progress) {
+                        const PyGrid &voxels, const nb::dict &options,
+                        const std::optional<nb::callable> &progress) {
   Callbacks callbacks;
   isowave::Compression compression = compression_of(options);
   report_to(callbacks, progress, compression);
-  const isowave::Grid grid{dims, spacing, origin, direction};
+  const isowave::Grid grid = grid_of(voxels);
   isowave::check_num_voxels(array.size(), grid);
   return callbacks.without_gil([&] {
-    return PyVolume{isowave::compress(array.data(), voxel_type(type), grid, compression)};
+    return PyVolume{
+        isowave::compress(array.data(), voxel_type(std::get<0>(voxels)), grid, compression)};
   });
 }
 
@@ -218,10 +225,9 @@ void add_volumes(nb::module_ &m) {
       .def("extract", &extract, "device"_a, "isovalue"_a, "level"_a, "normals"_a,
            "exact_vertices"_a, "memory_budget"_a, "progress"_a.none());
   m.def("save_mesh", &save_mesh, "vertices"_a, "faces"_a, "normals"_a.none(), "path"_a);
-  m.def("compress", &compress, "read"_a, "type"_a, "dims"_a, "spacing"_a, "origin"_a, "direction"_a,
-        "options"_a, "keep"_a, "path"_a.none(), "progress"_a.none());
-  m.def("compress_array", &compress_array, "array"_a, "type"_a, "dims"_a, "spacing"_a, "origin"_a,
-        "direction"_a, "options"_a, "progress"_a.none());
+  m.def("compress", &compress, "read"_a, "voxels"_a, "options"_a, "keep"_a, "path"_a.none(),
+        "progress"_a.none());
+  m.def("compress_array", &compress_array, "array"_a, "voxels"_a, "options"_a, "progress"_a.none());
   m.def("open", &open_volume, "path"_a, "options"_a, "dims"_a.none(), "type"_a.none(),
         "spacing"_a.none(), "progress"_a.none());
 }

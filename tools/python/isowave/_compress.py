@@ -194,11 +194,11 @@ def compressed(
     nz, ny, nx = source.shape
     columns: list[_core.Vector] = [column.tolist() for column in source.direction.T]
     spacing, origin = reversed_axes(source.spacing), reversed_axes(source.origin)
-    grid = (str(source.dtype), (nx, ny, nz), spacing, origin, columns)
+    voxels = (str(source.dtype), (nx, ny, nz), spacing, origin, columns)
     if file is None and is_plain(array):
-        return _core.compress_array(array, *grid, options, progress)
+        return _core.compress_array(array, voxels, options, progress)
     keep = not isinstance(array, (np.ndarray, memoryview))  # these can be read again at no cost
-    return _core.compress(source.read, *grid, options, keep, file, progress)
+    return _core.compress(source.read, voxels, options, keep, file, progress)
 
 
 def is_plain(array: Any) -> bool:

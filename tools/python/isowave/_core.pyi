@@ -13,6 +13,7 @@ class Error(RuntimeError): ...
 
 Vector = tuple[float, float, float] | list[float]
 Index3 = tuple[int, int, int]
+Voxels = tuple[str, Index3, Vector, Vector, list[Vector]]  # type, dims, spacing, origin, direction
 CameraTuple = tuple[
     tuple[float, float, float], tuple[float, float, float], tuple[float, float, float], float
 ]
@@ -71,11 +72,7 @@ class Volume:
 
 def compress(
     read: Callable[[int, int], NDArray[Any]],
-    type: str,
-    dims: tuple[int, int, int],
-    spacing: Vector,
-    origin: Vector,
-    direction: list[Vector],
+    voxels: Voxels,
     options: dict[str, Any],
     keep: bool,
     path: str | PathLike[str] | None,
@@ -83,11 +80,7 @@ def compress(
 ) -> Volume: ...
 def compress_array(
     array: NDArray[Any],
-    type: str,
-    dims: tuple[int, int, int],
-    spacing: Vector,
-    origin: Vector,
-    direction: list[Vector],
+    voxels: Voxels,
     options: dict[str, Any],
     progress: Callable[[str, float], object] | None,
 ) -> Volume: ...

@@ -7,6 +7,8 @@ import subprocess
 import numpy as np
 import pytest
 
+import isowave
+
 TOP = pathlib.Path(__file__).resolve().parents[3]
 FUEL = TOP / "tests/data/fuel_64x33x32_uint8.raw.gz"
 
@@ -33,6 +35,11 @@ def sphere_voxels(shape=(20, 25, 30), dtype=np.float32):
     z, y, x = np.ogrid[tuple(slice(0, n) for n in shape)]
     middle = [(n - 1) / 2 for n in shape]
     return np.sqrt((z - middle[0]) ** 2 + (y - middle[1]) ** 2 + (x - middle[2]) ** 2).astype(dtype)
+
+
+@pytest.fixture(scope="module")
+def volume():
+    return isowave.compress(sphere_voxels(), tolerance=0.01, spacing=(3, 2, 1), origin=(30, 20, 10))
 
 
 class RecordingCore:

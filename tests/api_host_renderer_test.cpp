@@ -1,0 +1,124 @@
+// What users of the library draw on the host: what it refuses, and how it is watched and stopped.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <isowave/isowave.hpp>
+#include <thread>
+
+#include "tests/api_support.hpp"
+
+namespace isowave {
+namespace {
+
+using core::test::error_of;
+using core::test::public_volume;
+using testing::HasSubstr;
+
+TEST(ApiHostRenderer, RefusesInOneLineWhatDevicesAloneCan) {
+  Renderer renderer = make_host_renderer(public_volume());
+  const FrameRequest good{.camera = renderer.camera(10), .isovalue = 10, .size = {64, 48}};
+  EXPECT_TRUE(renderer.can_draw(good));
+  const std::vector<std::uint8_t> picture = renderer.render(good).picture;
+  const auto expect_error = [&](const char *text, const auto &change) {
+    FrameRequest bad = good;
+    change(bad);
+    EXPECT_THAT(error_of([&] { renderer.render(bad); }), HasSubstr(text));
+    EXPECT_FALSE(renderer.can_draw(bad)) << text;
+    EXPECT_EQ(renderer.render(good).picture, picture) << text;
+  };
+  expect_error("leave out voxel_pixels", [](FrameRequest &r) { r.voxel_pixels = 1; });
+  expect_error("leave out voxel_error", [](FrameRequest &r) { r.voxel_error = 1; });
+  expect_error("leave out bound", [](FrameRequest &r) { r.bound = FieldBound::kLower; });
+  expect_error("leave out max_surface_error", [](FrameRequest &r) { r.max_surface_error = 1; });
+  expect_error("leave out want_bounds", [](FrameRequest &r) { r.want_bounds = true; });
+  expect_error("leave out time_budget_ms", [](FrameRequest &r) { r.time_budget_ms = 1; });
+  EXPECT_THAT(error_of([] { make_host_renderer(nullptr); }), HasSubstr("needs a volume"));
+  EXPECT_THAT(error_of([] { make_host_renderer(public_volume(), {.memory_limit = 1000}); }),
+              HasSubstr("raise the limit"));
+}
+
+TEST(ApiHostRenderer, CastRaysInTheWorld) {
+  Grid grid{.dims = {21, 21, 21}, .spacing = {1, 2, 3}, .origin = {5, 6, 7}};
+  std::vector<float> voxels;
+  for (int i = 0; i < 21 * 21 * 21; ++i) voxels.push_back(static_cast<float>(i / 441));  // z
+  Renderer renderer = make_host_renderer(compress(voxels, grid, {.tolerance = 1e-4}));
+  // The surface is the plane z = 7 + 3 * 10.5.
+  const std::vector<Ray> rays = {{{10, 20, 0}, {0, 0, 1}},
+                                 {{10, 20, 0}, {0, 0, 10}},
+                                 {{10, 20, 100}, {0.25, 0.25, -2}},
+                                 {{10, 20, 0}, {0, 0, -1}},
+                                 {{100, 20, 0}, {0, 0, 1}}};
+  const Frame hits = renderer.cast_rays(rays, 10.5f);
+  ASSERT_EQ(hits.rows, 1u);
+  ASSERT_EQ(hits.columns, 5u);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double t = (38.5 - rays[i].origin[2]) / rays[i].direction[2];
+    EXPECT_NEAR(hits.depth[i], t, 1e-3 * t);
+    EXPECT_NEAR(hits.positions[i][2], 38.5, 1e-3);
+    EXPECT_NEAR(hits.positions[i][0], rays[i].origin[0] + t * rays[i].direction[0], 1e-3);
+    EXPECT_NEAR(hits.normals[i][2], -1, 1e-3);
+    EXPECT_EQ(hits.hits[i].cell[2], 10u);
+  }
+  for (std::size_t i = 3; i < 5; ++i) {
+    EXPECT_TRUE(std::isinf(hits.depth[i]));
+    EXPECT_TRUE(std::isnan(hits.positions[i][0]));
+  }
+  EXPECT_THAT(error_of([&] { renderer.cast_rays(std::vector<Ray>(1), 1); }),
+              HasSubstr("direction"));
+}
+
+TEST(ApiHostRenderer, FramesCanBeWatchedAndStopped) {
+  Renderer renderer = make_host_renderer(public_volume(), {.num_threads = 1});
+  FrameRequest request{.camera = renderer.camera(10), .isovalue = 10, .size = {128, 96}};
+  const Frame whole = renderer.render(request);
+  EXPECT_EQ(whole.statistics.passes, 1u);
+  std::vector<std::uint8_t> last;
+  std::uint32_t passes = 0;
+  request.on_pass = [&](const Progress &progress) {
+    EXPECT_EQ(progress.passes(), ++passes);
+    last = progress.picture();
+    return true;
+  };
+  EXPECT_EQ(renderer.render(request).picture, whole.picture);
+  EXPECT_EQ(last, whole.picture);
+  EXPECT_EQ(passes, 6u);
+  request.on_pass = [](const Progress &progress) { return progress.completed_percent() < 50; };
+  const Frame stopped = renderer.render(request);
+  EXPECT_TRUE(stopped.statistics.cancelled);
+  EXPECT_FALSE(stopped.statistics.complete);
+  EXPECT_EQ(stopped.statistics.passes, 3u);
+  EXPECT_NE(stopped.picture, whole.picture);
+  const std::size_t half = whole.picture.size() / 2;
+  EXPECT_TRUE(std::equal(whole.picture.begin(), whole.picture.begin() + std::ptrdiff_t(half),
+                         stopped.picture.begin()));
+}
+
+TEST(ApiHostRenderer, ThreadsShareARenderer) {
+  Renderer renderer = make_host_renderer(public_volume());
+  std::vector<FrameRequest> requests;
+  std::vector<std::vector<float>> depths;
+  for (const float isovalue : {10.0f, 60.0f}) {
+    requests.push_back({.camera = renderer.camera(isovalue),
+                        .isovalue = isovalue,
+                        .size = {64, 48},
+                        .want_depth = true});
+    depths.push_back(renderer.render(requests.back()).depth);
+  }
+  EXPECT_NE(depths[0], depths[1]);
+  std::atomic<int> num_equal = 0;
+  std::vector<std::jthread> threads;
+  for (std::size_t i = 0; i < 4; ++i) {
+    threads.emplace_back([&, i] {
+      for (int frame = 0; frame < 5; ++frame)
+        num_equal += renderer.render(requests[i % 2]).depth == depths[i % 2];
+    });
+  }
+  threads.clear();
+  EXPECT_EQ(num_equal, 20);
+}
+
+}  // namespace
+}  // namespace isowave

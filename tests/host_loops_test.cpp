@@ -1,0 +1,153 @@
+// The host's loops over rays, for any processor and for this one: the bits of the twin, which skips
+// nothing, and of rays alone.
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <cstring>
+
+#include "core/frame/ambient_rays.hpp"
+#include "core/frame/appearance.hpp"
+#include "core/host/host_blocks.hpp"
+#include "core/host/host_loops.hpp"
+#include "core/io/open_volume.hpp"
+#include "reference/random.hpp"
+#include "tests/frame_scene.hpp"
+#include "tests/ray_cases.hpp"
+
+namespace isowave::core {
+namespace {
+
+using test::expect_same_hits;
+using test::TestVolume;
+
+/// The loops for any processor, and for this one.
+TEST(HostLoops, AllGiveTheSameBits) {
+  const auto reader = open_volume(ISOWAVE_TEST_DATA "/fuel_64x33x32_uint8.raw.gz");
+  const TestVolume volume(*reader, 6);
+  HostBlocks blocks(volume.compressed, HostBlocks::kNoLimit, 0);
+  blocks.select(10);
+  FrameParams frame =
+      make_frame_params(volume.info(), orbit_cameras(volume.info(), 1)[0], {64, 48}, 10);
+  const auto expected = render_scalar(frame, volume.voxels);
+  frame.surface = blocks.surface();
+  const ShadeParams shading = make_shade_params(volume.info(), {});
+  const Image8 picture = shade_scalar(frame, shading, expected);
+  const auto directions = make_ambient_directions(3);
+  const AmbientRays ambient{make_ambient_params(volume.info()), directions.data(), 3};
+  const std::vector<FrameParams> frames = {frame};
+  const std::vector<VolumeInfo> infos = {volume.info()};
+  const std::vector<std::vector<float>> voxels = {volume.voxels};
+  const std::vector<uchar> open = count_open(frames, infos, voxels, expected, 3);
+  std::vector<HitRecord> smooth = expected;
+  smooth_gradients(frame, volume.voxels, smooth);
+  for (const HostLoops &loops : all_host_loops()) {
+    std::vector<HitRecord> hits(64 * 48, no_hit());
+    for (const auto trace : {loops.trace, loops.trace_rays}) {
+      for (const bool is_smooth : {true, false}) {
+        std::ranges::fill(hits, no_hit());
+        EXPECT_EQ(trace(frame, blocks.field(), {0, 0, 64, 48}, is_smooth, hits.data()),
+                  test::num_hits(expected));
+        expect_same_hits(hits, is_smooth ? smooth : expected, 64);
+      }
+    }
+    std::vector<uchar> counts(64 * 48);
+    loops.ambient(frame, blocks.field(), {0, 0, 64, 48}, ambient, hits.data(), counts.data());
+    EXPECT_EQ(counts, open);
+    std::vector<std::uint8_t> row(3 * 64);
+    loops.shade(frame, shading, 1, 23, hits.data(), nullptr, 0, row.data());
+    EXPECT_EQ(std::memcmp(row.data(), picture.pixels.data() + 23 * row.size(), row.size()), 0);
+    std::size_t num_compared = 0;
+    for (std::uint32_t id = 0; id < volume.compressed.block_count(); ++id) {
+      if (!blocks.is_decoded(id)) continue;
+      ++num_compared;
+      float values[64];
+      loops.decode({volume.compressed.words.data(), volume.compressed.block_begin(id),
+                    volume.compressed.block_bits(id), volume.compressed.precision.min_exponent,
+                    false, 4, 4, 4, 0},
+                   values);
+      ASSERT_EQ(std::memcmp(values, blocks.field().values + 64 * id, sizeof(values)), 0) << id;
+      EXPECT_EQ(loops.inside(values, 10), host_loops().inside(values, 10));
+    }
+    EXPECT_GT(num_compared, 100u);
+  }
+}
+
+/// A tile that ends within packets of 4 x 2 rays: nothing beyond it is drawn, nothing missing.
+TEST(HostLoops, TilesOfAnySize) {
+  const glm::uvec3 dims(20, 21, 22);
+  const TestVolume volume(dims, test::gyroid_field(9), 8);
+  HostBlocks blocks(volume.compressed, HostBlocks::kNoLimit, 0);
+  blocks.select(0.2f);
+  FrameParams frame =
+      make_frame_params(volume.info(), orbit_cameras(volume.info(), 1)[0], {64, 48}, 0.2f);
+  const auto whole = render_scalar(frame, volume.voxels);
+  frame.surface = blocks.surface();
+  for (const RayTile tile : {RayTile{20, 15, 37, 32}, {21, 16, 22, 17}, {30, 20, 30, 20}}) {
+    std::vector<HitRecord> expected(whole.size(), no_hit()), hits = expected;
+    for (uint y = tile.begin_y; y < tile.end_y; ++y) {
+      for (uint x = tile.begin_x; x < tile.end_x; ++x) expected[x + 64 * y] = whole[x + 64 * y];
+    }
+    EXPECT_EQ(host_loops().trace(frame, blocks.field(), tile, false, hits.data()),
+              test::num_hits(expected));
+    expect_same_hits(hits, expected, 64);
+  }
+}
+
+/// Packets against rays alone: odd volumes, eyes anywhere, ties. ISOWAVE_FUZZ_RAYS: so many rays,
+/// instead of half a million.
+TEST(HostLoops, PacketsFindWhatRaysAloneFind) {
+  const char *asked = std::getenv("ISOWAVE_FUZZ_RAYS");
+  const std::uint64_t num_rays = asked != nullptr ? std::strtoull(asked, nullptr, 10) : 500'000;
+  const ImageSize size{41, 31};
+  Random random(17);
+  std::uint64_t rays = 0, num_hits = 0;
+  for (std::uint32_t volume_number = 0; rays < num_rays; ++volume_number) {
+    const auto dim = [&] { return static_cast<std::uint32_t>(random.in(2, 46)); };
+    const glm::uvec3 dims(dim(), dim(), dim());
+    const bool is_whole = volume_number % 3 == 1;
+    const TestVolume volume(dims,
+                            volume_number % 3 == 0 ? test::gyroid_field(random.in(6, 60))
+                            : is_whole             ? test::plateau_field()
+                                                   : test::noise_field(volume_number),
+                            16);
+    const float isovalue = is_whole ? volume.voxels[volume.voxels.size() / 2]
+                                    : static_cast<float>(random.in(-0.9, 0.9));
+    HostBlocks blocks(volume.compressed, HostBlocks::kNoLimit, 0);
+    blocks.select(isovalue);
+    std::vector<Camera> cameras = hard_cameras(dims);
+    const glm::dvec3 extent = glm::dvec3(dims) - 1.0;
+    const auto anywhere = [&](double margin) {
+      return extent * glm::dvec3(random.in(-margin, 1 + margin), random.in(-margin, 1 + margin),
+                                 random.in(-margin, 1 + margin));
+    };
+    for (int i = 0; i < 8; ++i) {
+      const glm::dvec3 eye = anywhere(i < 4 ? 0 : 2);
+      cameras.push_back(test::camera_along(i % 2 == 0 ? glm::round(eye) : eye,
+                                           anywhere(0) + glm::dvec3(0.01, 0.02, 0.03) - eye,
+                                           {0.3, 1, 0.2}, random.in(2, 110)));
+    }
+    for (std::size_t view = 0; view < cameras.size(); ++view, rays += size.num_rays()) {
+      FrameParams frame = make_frame_params(volume.info(), cameras[view], size, isovalue);
+      frame.surface = blocks.surface();
+      std::vector<HitRecord> expected(size.num_rays(), no_hit()), hits = expected;
+      const RayTile all = {0, 0, size.width, size.height};
+      num_hits += host_loops().trace_rays(frame, blocks.field(), all, false, expected.data());
+      for (const HostLoops &loops : all_host_loops()) {
+        if (loops.trace == loops.trace_rays) continue;
+        hits.assign(size.num_rays(), no_hit());
+        loops.trace(frame, blocks.field(), all, false, hits.data());
+        expect_same_hits(hits, expected, size.width);
+      }
+      ASSERT_FALSE(HasFailure()) << fmt::format("volume {} ({}x{}x{}), isovalue {}, view {}",
+                                                volume_number, dims.x, dims.y, dims.z, isovalue,
+                                                view);
+    }
+  }
+  RecordProperty("rays", std::to_string(rays));
+  EXPECT_GT(num_hits, rays / 20);
+}
+
+}  // namespace
+}  // namespace isowave::core
