@@ -9,7 +9,7 @@
 /// Ranges are stored in 8 bits through `thresholds` [256], ascending from -INFINITY to INFINITY:
 /// low = the last threshold <= min, high = the first >= max. So they only ever grow: no block is
 /// skipped wrongly. With `below` the first threshold >= isovalue + e and `above` the first >=
-/// isovalue - f, where the frame's voxels may be lower by e and higher by f than those that ranges
+/// isovalue - f, if the frame's voxels may be lower by e and higher by f than those that ranges
 /// were made of, some value may be below the isovalue iff low < below, and some at or above iff
 /// high >= above. Both: active. e and f may be larger for blocks of larger bounds (block_bound.h).
 /// Coarse macrocells of 4^3 blocks hold the union of their blocks.

@@ -58,7 +58,7 @@ class ProcessTeam : public core::Team {
   Processes &processes_;
 };
 
-/// What a team's renderer needs, in the order in which it is made.
+/// The objects that a team's renderer needs, in the order in which they are made.
 struct TeamHeld {
   explicit TeamHeld(Processes &processes) : team(processes) {}
 
@@ -69,7 +69,7 @@ struct TeamHeld {
   std::vector<std::string> notices{};
 };
 
-/// What all processes must be asked for alike.
+/// A text of the options in which all processes must agree.
 std::string text_of(const BrickOptions &options, const core::Storage &storage) {
   const RendererOptions &renderer = options.renderer;
   return fmt::format("{} {} {} {} {} {} {} {} {} {} {} {} {} {} {}", renderer.largest.width,

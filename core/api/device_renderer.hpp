@@ -10,21 +10,21 @@
 namespace isowave {
 
 core::RendererOptions core_options(const RendererOptions &options, std::uint32_t num_levels);
-/// Around a renderer of a device, what the options ask for.
+/// Puts renderers with the abilities of the options around a device's renderer.
 std::unique_ptr<core::Renderer> add_choices(std::unique_ptr<core::Renderer> renderer,
                                             const RendererOptions &options,
                                             const core::CompressedVolume &volume, double rate);
-/// What the renderer of make_on_device() can.
+/// Abilities of the renderer that make_on_device() makes.
 core::Abilities abilities_on_device(const RendererOptions &options, const Volume &volume);
-/// Takes a turn of the device. before_kernel: called before each kernel is compiled; what it throws
-/// is thrown here.
+/// Makes a renderer, in a turn of the device. before_kernel: called before each kernel is compiled;
+/// an exception from it is thrown here.
 std::unique_ptr<core::Renderer> make_on_device(Device &device, const Volume &volume,
                                                const RendererOptions &options,
                                                const std::function<void()> &before_kernel = {});
-/// Throws  core::Error: there is none
+/// Throws  core::Error: there is no device, or no volume
 void check_there(const std::shared_ptr<Device> &device,
                  const std::shared_ptr<const Volume> &volume);
-/// What users of that renderer see.
+/// Makes the part of isowave::Renderer behind that renderer.
 std::unique_ptr<Renderer::Implementation> make_implementation(
     std::shared_ptr<Turns> turns, std::shared_ptr<Device> device,
     std::shared_ptr<const Volume> volume, std::unique_ptr<core::Renderer> renderer);

@@ -72,7 +72,7 @@ class HitCells {
   std::vector<core::FrameParams> grids_;
 };
 
-/// Where hits are.
+/// World positions of hits.
 class HitPositions {
  public:
   HitPositions(const core::CompressedVolume &volume, bool with_levels)

@@ -16,15 +16,15 @@ namespace isowave {
 core::ImageSize core_size(const ImageSize &size);
 Camera public_camera(const core::Camera &camera);
 core::Appearance core_appearance(const Appearance &appearance);
-/// What is drawn of the volume, and how precisely; without on_pass.
+/// The request as core has it, without on_pass.
 core::FrameRequest core_request(const FrameRequest &request, const core::CompressedVolume &volume);
 
-/// Throws  core::Error: the request wants of the frame what a renderer of these abilities has not
+/// Throws  core::Error: the request wants an array that a renderer of these abilities cannot give
 void check_wanted(const FrameRequest &request, const core::Abilities &abilities);
 /// Whether a renderer of these abilities draws the request.
 bool can_draw(const FrameRequest &request, const core::Abilities &abilities,
               const core::CompressedVolume &volume);
-/// All that the processes of a team must ask for alike.
+/// A text of the fields in which the processes of a team must agree.
 std::string text_of(const FrameRequest &request);
 
 /// A Progress that any number of threads may look at: pictures take turns, and between two calls of

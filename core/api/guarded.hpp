@@ -8,13 +8,13 @@
 
 namespace isowave::core {
 
-/// What the exception at work says, in one line. To be called in a catch clause. doing: what
-/// failed, for exceptions that do not say that: "isowave render".
+/// The text of the current exception, in one line. Call it in a catch clause. doing: what failed,
+/// for exceptions that do not say it: "isowave render".
 std::string text_of_current_exception(std::string_view doing);
 
 /// Calls work() and returns what it returns.
 ///
-/// Throws  Error alone
+/// Throws  only Error
 template <class Work>
 auto guarded(std::string_view doing, const Work &work) {
   try {

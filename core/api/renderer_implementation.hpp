@@ -17,7 +17,7 @@
 
 namespace isowave {
 
-/// What the program reports of a frame, beside what Frame says.
+/// Facts of a frame that the program reports, beside those of Frame.
 struct LastFrame {
   core::FrameStats stats{};
   core::Certificate certificate{};  ///< with FrameRequest::want_bounds; its bounds are Frame's
@@ -28,7 +28,7 @@ struct Renderer::Implementation {
   /// of      the volume that this process draws, which must outlive this
   Implementation(std::shared_ptr<Turns> turns, const core::CompressedVolume &of,
                  std::unique_ptr<core::Renderer> renderer);
-  /// The same of a volume that the user has opened.
+  /// The same for a volume that the user has opened.
   Implementation(std::shared_ptr<Turns> turns, std::shared_ptr<const Volume> of,
                  std::unique_ptr<core::Renderer> renderer);
   /// Buffers go while no other thread drives the device.

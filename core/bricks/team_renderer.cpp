@@ -145,7 +145,7 @@ void TeamRenderer::enlarge_kept(const FrameRequest &request) {
 }
 
 /// All ranks get the hits that are seen, and each casts their rays through its brick. A ray is open
-/// where it meets nothing in any.
+/// if it meets nothing in any.
 void TeamRenderer::add_ambient(const FrameRequest &request, FrameStats &stats) {
   std::vector<HitRecord> placed;
   together(team_, [&] {

@@ -14,7 +14,7 @@
 
 namespace isowave::core {
 
-/// What putting pictures together has taken so far, at this rank.
+/// Statistics of putting pictures together so far, at this rank.
 struct CompositionStats {
   std::uint64_t reductions = 0, bytes = 0;  ///< words that this rank gave
   double ms = 0;                            ///< wall clock, with the wait for slower ranks

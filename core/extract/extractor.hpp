@@ -22,7 +22,7 @@ struct ExtractorOptions {
   std::uint64_t memory_budget = 0;  ///< bound on all device memory [bytes]; 0: 3/4 of the device's
   /// Decoded blocks kept at most; 0: as many as the surface needs, if the budget allows.
   std::uint32_t cache_slots = 0;
-  StreamPlace stream = StreamPlace::kAuto;  ///< where the compressed volume is
+  StreamPlace stream = StreamPlace::kAuto;  ///< place of the compressed volume
   std::uint32_t part_vertices = 1u << 20;   ///< of a part of the mesh at most, but for one block's
 };
 

@@ -41,7 +41,7 @@ ocl::BufferSizes own_sizes(const CompressedVolume &volume, const SurfaceBlocks::
       .add(options.beside);
 }
 
-/// On the device, where that leaves a quarter of the budget; or as asked for.
+/// The place of the stream: as asked for, or the device if that leaves a quarter of the budget.
 DeviceStream make_stream(ocl::Device &device, const CompressedVolume &volume,
                          const SurfaceBlocks::Options &options) {
   check_volume_info(volume.info, "the volume");

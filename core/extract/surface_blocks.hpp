@@ -19,7 +19,7 @@ class SurfaceBlocks {
   struct Options {
     Gradients gradients = Gradients::kNone;
     std::uint64_t memory_budget = 0;          ///< bound on all device memory [bytes]
-    StreamPlace stream = StreamPlace::kAuto;  ///< where the compressed volume is
+    StreamPlace stream = StreamPlace::kAuto;  ///< place of the compressed volume
     /// Other buffers that the owner keeps on the device as long as this.
     ocl::BufferSizes beside{};
     /// Rays of the Wavefront: a picture's, or one.

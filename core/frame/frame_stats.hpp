@@ -1,5 +1,5 @@
 #pragma once
-// What drawing a frame has done.
+// Statistics of a frame.
 
 #include <cstdint>
 #include <map>
@@ -12,30 +12,29 @@
 
 namespace isowave::core {
 
-/// What one pass did: the counts of the device, and what follows from them.
+/// Statistics of a pass: the counts of the device, and numbers that follow from them.
 struct PassStats {
   PassCounts counts{};
-  double n_spec = 0;  ///< blocks that the pass's rays were to look ahead at, mean over the rays; 0
-                      ///< where none looked
+  double n_spec = 0;  ///< blocks that a ray was to look ahead at, mean; 0 if no ray looked ahead
   /// Distinct blocks that rays were intersected in; not counted in pipeline `rays`, which does not
   /// gather rays by block.
   std::optional<std::uint32_t> visible_blocks{};
-  /// Distinct blocks whose voxels the pass's rays looked at, or, where a whole dual grid is asked
-  /// for, may have; only where the host waits after each pass.
+  /// Distinct blocks whose voxels the pass's rays looked at, or may have looked at if rays request
+  /// whole dual grids. Only if the host waits after each pass.
   std::optional<std::uint32_t> touched_blocks{};
-  double utilization_percent = 0;  ///< ray-block pairs that were intersected, of all rays
-  double completed_percent = 0;    ///< rays that have ended, of all
+  double utilization_percent = 0;  ///< ray-block pairs that were intersected, per ray
+  double completed_percent = 0;    ///< rays that have ended, of all rays
   bool begins_anew = false;        ///< the first after another renderer's passes, see SoonRenderer
   std::map<std::string, double>
       stage_ms;  ///< by stage; empty unless the device was opened with profiling
 };
 
-/// What a part of a frame took that comes after the passes that found the hits.
+/// Statistics of the passes after those that found the hits: for normals, or for ambient rays.
 struct LaterPasses {
   std::uint32_t passes = 0;
-  std::uint64_t decoded_blocks = 0;        ///< for it alone
+  std::uint64_t decoded_blocks = 0;        ///< blocks decoded in these passes
   std::uint64_t recycled_blocks = 0;       ///< see PassCounts::recycled_count
-  double ms = 0;                           ///< wall clock, of total_ms
+  double ms = 0;                           ///< wall clock, a part of total_ms
   std::map<std::string, double> stage_ms;  ///< as PassStats::stage_ms
 
   LaterPasses &operator+=(const LaterPasses &other) {
@@ -48,13 +47,13 @@ struct LaterPasses {
   }
 };
 
-/// A picture that was drawn on the way to one within a time budget. If it was cancelled, since time
-/// was over, the picture before shows through its rays without a hit.
+/// A step of a frame within a time budget. If the step was cancelled because time was over, the
+/// picture before shows through its rays without a hit.
 struct TimedStep {
   ImageSize size;
   double voxel_pixels = 0;       ///< distance of voxels, in pixels of this step
   double ms = 0;                 ///< wall clock
-  double completed_percent = 0;  ///< of its pixels
+  double completed_percent = 0;  ///< percentage of finished pixels
   bool cancelled = false;
 };
 
@@ -68,10 +67,9 @@ struct Detail {
 struct DetailChoice {
   Detail detail;
   bool reachable = true;  ///< most pixels keep the error at full detail
-  double median = 0;      ///< bound there [pixels]
-  /// If it is not reachable: the error of the volume's voxels, smaller than it is, with which the
-  /// median would be max_surface_error; none if no such error is known that a volume can be stored
-  /// with.
+  double median = 0;      ///< median bound at full detail [pixels]
+  /// If it is not reachable: a smaller error of the volume's voxels with which the median would be
+  /// max_surface_error; none if no such error is known that a volume can be stored with.
   std::optional<double> tolerance{};
   std::string advice{};  ///< what would help
   /// A detail that was tried, and the share of pixels that are not certain to miss and keep the
@@ -84,19 +82,19 @@ struct DetailChoice {
   double total_ms = 0;
 };
 
-/// What drawing a frame has done.
+/// Statistics of a frame.
 struct FrameStats {
-  std::vector<PassStats> passes;                ///< that looked for hits
-  LaterPasses normals;                          ///< Normals::kSmooth
-  LaterPasses ambient;                          ///< of ambient rays
-  std::size_t first_level = 0, last_level = 0;  ///< of detail, that drew; 0: the finest
+  std::vector<PassStats> passes;                ///< passes that looked for hits
+  LaterPasses normals;                          ///< passes for Normals::kSmooth
+  LaterPasses ambient;                          ///< passes of ambient rays
+  std::size_t first_level = 0, last_level = 0;  ///< levels of detail that drew; 0: the finest
   double total_ms = 0;  ///< wall clock, from camera to finished hit buffer on the device
   std::uint64_t rays_hit = 0;
   std::uint64_t uploaded_blocks = 0;  ///< from a compressed volume on the host ...
   std::uint64_t uploaded_bytes = 0;   ///< ... and their bytes
-  /// on_pass said so before the picture was finished; the hit buffer holds the picture so far. If
-  /// the last of `passes` has left no rays, that has all hits, some with the gradients of their
-  /// cells, or of fewer ambient rays.
+  /// Whether on_pass stopped the frame before the picture was finished. The hit buffer then holds
+  /// the picture so far. If the last of `passes` has left no rays, the picture has all hits, some
+  /// with the gradients of their cells, or with fewer ambient rays.
   bool cancelled = false;
   bool complete = true;                  ///< false: cancelled, or the time budget was over
   std::vector<TimedStep> steps{};        ///< with a time budget: in the order of drawing

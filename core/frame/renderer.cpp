@@ -11,7 +11,7 @@ namespace isowave::core {
 
 namespace {
 
-/// What must be chosen by the renderer, or by the user, not by both.
+/// Checks settings that either the renderer or the user may choose, not both.
 void check_choices(const FrameRequest &request) {
   if (!request.max_surface_error) return;
   if (request.time_budget_ms)
@@ -64,8 +64,7 @@ void check(const FrameRequest &request, const Abilities &abilities) {
        "ambient rays need a renderer that was made with_rays");
   need(request.max_surface_error.has_value(), abilities.surface_error,
        "this renderer knows no bounds of the error: leave out max_surface_error, or draw on a "
-       "device "
-       "by a renderer that was made with_bounds");
+       "device by a renderer that was made with_bounds");
   need(request.time_budget_ms.has_value(), abilities.time_budget,
        "this renderer keeps no time: leave out time_budget_ms, or draw on a device by a renderer "
        "that was made with_time_budget");

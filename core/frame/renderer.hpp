@@ -1,7 +1,7 @@
 #pragma once
 // A renderer turns a request into a picture. A device, the host, a team of processes and the scalar
-// twin are renderers: the same request gives the same bits. What can be added to any of them, a
-// time budget or a bound of the error, is a renderer around another (RendererAround).
+// twin are renderers: the same request gives the same bits. A time budget or a bound of the error
+// can be added to any of them, by a renderer around another (RendererAround).
 
 #include <cstdint>
 #include <limits>
@@ -18,28 +18,28 @@
 
 namespace isowave::core {
 
-/// What requests may ask of a renderer, beside a picture of full detail.
+/// Abilities of a renderer, beside a picture of full detail.
 struct Abilities {
   ImageSize largest{};  ///< picture of a request without a size
-  std::uint64_t most_rays = std::numeric_limits<std::uint64_t>::max();  ///< of a frame
+  std::uint64_t most_rays = std::numeric_limits<std::uint64_t>::max();  ///< most rays of a frame
   bool levels = false;             ///< FrameRequest::voxel_pixels
   bool fewer_planes = false;       ///< FrameRequest::voxel_error
   bool bounds = false;             ///< FrameRequest::bound
   bool given_rays = false;         ///< FrameRequest::ambient_rays, and cast_rays()
-  bool cells = true;               ///< hits say in which cell they are: HitRecord::block_id
+  bool cells = true;               ///< hits name their cell: HitRecord::block_id
   bool surface_error = false;      ///< FrameRequest::max_surface_error
   bool time_budget = false;        ///< FrameRequest::time_budget_ms
-  bool kept_picture = false;       ///< keep_picture() and what goes with it
+  bool kept_picture = false;       ///< keep_picture(), fill_from_kept(), enlarge_kept()
   bool parallel = true;            ///< Camera::parallel_height
-  Solver solver = kDefaultSolver;  ///< finds the hits
+  Solver solver = kDefaultSolver;  ///< the root finder
 };
 
-/// Throws  Error: the request is out of range, or asks for what the abilities do not have
+/// Throws  Error: the request is out of range, or asks for an ability that the renderer lacks
 void check(const FrameRequest &request, const Abilities &abilities);
 
-/// Throws  Error unless it is finite and above 0
+/// Throws  Error unless the error is finite and above 0
 void check_max_surface_error(double max_surface_error);
-/// Throws  Error unless it is finite and above 0
+/// Throws  Error unless the budget is finite and above 0
 void check_time_budget(double budget_ms);
 
 /// The size of the request's picture.
@@ -56,7 +56,7 @@ class Renderer {
   Renderer &operator=(const Renderer &) = delete;
 
   virtual Abilities abilities() const = 0;
-  /// The processes that draw the picture together: this one, unless said otherwise.
+  /// The processes that draw the picture together: by default only this one.
   virtual Team &team() { return alone_; }
   /// Grids of the whole volume's levels of detail that requests may use, the finest first.
   virtual std::vector<VolumeInfo> levels() const = 0;
@@ -67,21 +67,22 @@ class Renderer {
   ///         draw further frames afterwards
   virtual FrameStats render(const FrameRequest &request) = 0;
 
-  /// The first hit of each ray, in the finest level of detail. t counts in lengths of the ray's
-  /// direction. Leaves the picture of the last frame as it is.
+  /// The first hit of each ray, in the finest level of detail. t counts lengths of the ray's
+  /// direction. The picture of the last frame stays.
   ///
   /// Throws  Error: no ability for given rays; what make_index_rays() throws; the isovalue is NaN
   virtual std::vector<HitRecord> cast_rays(std::span<const WorldRay> rays, float isovalue,
                                            Normals normals) = 0;
 
-  /// A view in which isosurfaces fill a picture of that size, see surface_camera(); no size: of the
+  /// A view in which isosurfaces fill a picture of that size, see surface_camera(); no size: the
   /// largest.
   ///
   /// Throws  Error: an isovalue is NaN
   virtual Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {}) = 0;
 
-  // The last frame, or within on_pass the frame at work. A team's rank 0 gets it, other ranks get
-  // empty ones. All throw Error if no frame was drawn, and wait.
+  // These functions return the last frame, or within on_pass the frame at work. Rank 0 of a team
+  // gets the frame, and other ranks get empty ones. All of them wait, and throw Error if no frame
+  // was drawn.
 
   virtual ImageSize size() const = 0;
   /// RGB [size.height][size.width], row 0 at the top.
@@ -90,26 +91,26 @@ class Renderer {
   virtual std::vector<HitRecord> hits() = 0;
   /// Distances from the eye [world units], as hits().
   virtual std::vector<float> depth() { return depth_of(hits()); }
-  /// Rays that hit, of the frame with those statistics.
+  /// Number of rays that hit, for the frame with those statistics.
   virtual std::uint64_t num_hits(const FrameStats &stats) { return stats.rays_hit; }
 
   // Pictures of one frame with more and more pixels (timed_renderer.hpp), for renderers with
-  // Abilities::kept_picture. The others throw std::logic_error.
+  // Abilities::kept_picture. Other renderers throw std::logic_error.
 
-  /// Puts the last frame's picture aside: of at most half the pixels of the largest, along each
-  /// axis, rounded up (halved()).
+  /// Puts the last frame's picture aside. It has at most half the pixels of the largest picture
+  /// along each axis, rounded up (halved()).
   virtual void keep_picture();
-  /// The rays of the last frame without a hit show the kept picture's, as after a frame that was
-  /// cancelled. Waits.
+  /// Gives rays of the last frame without a hit the kept picture's hits, as after a cancelled
+  /// frame. Waits.
   virtual void fill_from_kept();
-  /// The kept picture, of the same request, becomes the last frame's, with as many pixels as the
+  /// Makes the kept picture, of the same request, the last frame's, with as many pixels as the
   /// request says. Waits.
   virtual void enlarge_kept(const FrameRequest &request);
 
-  /// Forgets all decoded blocks, so that the next frame is a cold one: for measurements. No picture
+  /// Forgets all decoded blocks, so that the next frame is a cold one, for measurements. No picture
   /// depends on it.
   virtual void clear_cache() = 0;
-  /// Memory that the renderer holds: of its device, if it has one [bytes].
+  /// Memory that the renderer holds [bytes]: its device's, if it has one.
   virtual std::uint64_t memory_bytes() const = 0;
   virtual double setup_ms() const { return 0; }  ///< wall clock of making it, without compiling
 
@@ -120,7 +121,8 @@ class Renderer {
   TeamOfOne alone_;
 };
 
-/// A renderer that hands on to another all but what a class derived from this overrides.
+/// A renderer that hands all calls on to another renderer, except those that a derived class
+/// overrides.
 class RendererAround : public Renderer {
  public:
   /// inner: must outlive this

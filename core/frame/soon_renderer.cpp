@@ -47,7 +47,7 @@ Renderer &SoonRenderer::wait_for_ready() {
   return *made_;
 }
 
-/// Null: the other renderer is ready, or this one could not be made.
+/// The renderer meanwhile; null if the other one is ready, or this one could not be made.
 Renderer *SoonRenderer::find_meanwhile() {
   if (is_ready_) return nullptr;
   if (!meanwhile_ && has_meanwhile_) {

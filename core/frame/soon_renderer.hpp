@@ -1,6 +1,6 @@
 #pragma once
-// Pictures at once by one renderer, until a better one is made: a device's takes long, since its
-// kernels are compiled.
+// Draws at once by one renderer until another one is made, such as a device's renderer, which takes
+// long because kernels are compiled.
 
 #include <atomic>
 #include <exception>
@@ -14,24 +14,24 @@
 
 namespace isowave::core {
 
-/// The two renderers of a SoonRenderer, and what is known of them before they are made. Both draw
-/// the same volume, alone.
+/// The two renderers of a SoonRenderer: how to make them, and their abilities before they are made.
+/// Both draw the same volume, in this process alone.
 struct SoonParts {
-  Abilities abilities;  ///< of the renderer that takes long
-  /// Makes that renderer, in a thread of its own. If a stop is requested, it should throw soon.
+  Abilities abilities;  ///< abilities of the renderer that takes long
+  /// Makes that renderer, in a thread of its own. Should throw soon if a stop is requested.
   std::function<std::shared_ptr<Renderer>(const std::stop_token &)> make;
   /// Called before the renderer that takes long works for a call, in the thread of that call.
   std::function<void()> before_use = [] {};
-  Abilities meanwhile_abilities;  ///< of the renderer that draws meanwhile
-  /// Makes that renderer when a frame first needs it. What it throws is not told: frames then wait
-  /// for the other renderer.
+  Abilities meanwhile_abilities;  ///< abilities of the renderer that draws meanwhile
+  /// Makes that renderer when a frame first needs it. If it throws, frames wait for the other
+  /// renderer, and its error is not reported.
   std::function<std::unique_ptr<Renderer>()> make_meanwhile;
 };
 
-/// Draws by the renderer meanwhile until the other one is ready, from then on by that one. A frame
-/// at work when it becomes ready is begun anew (PassStats::begins_anew). A request that the
-/// renderer meanwhile cannot draw waits. If making the other renderer fails, each call that needs
-/// it throws what went wrong.
+/// Draws by the renderer meanwhile until the other one is ready, and then by the other one. If the
+/// other one becomes ready during a frame, it begins the frame anew (PassStats::begins_anew). A
+/// request that the renderer meanwhile cannot draw waits. If making the other renderer fails, each
+/// call that needs it throws the error.
 ///
 /// ready(), ready_for(), abilities(), memory_bytes(), wait() and give_up() may be called from any
 /// thread.
@@ -48,7 +48,7 @@ class SoonRenderer : public RendererAround {
   bool ready_for(const FrameRequest &request) const;
   /// Waits until ready().
   ///
-  /// Throws  what went wrong when the renderer was made
+  /// Throws  the error of making the renderer
   void wait() const;
   /// Requests a stop of the making, and does not wait.
   void give_up() { maker_.request_stop(); }
@@ -63,7 +63,7 @@ class SoonRenderer : public RendererAround {
                                    Normals normals) override;
   Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {}) override;
   void clear_cache() override;
-  /// Memory of the renderer that took long, as its last call left it; 0 before it is ready.
+  /// Memory of the renderer that took long, after its last call; 0 before it is ready.
   std::uint64_t memory_bytes() const override { return is_ready_ ? memory_bytes_.load() : 0; }
   double setup_ms() const override { return is_ready_ && made_ ? made_->setup_ms() : 0; }
 

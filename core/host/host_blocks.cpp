@@ -228,7 +228,7 @@ std::optional<BlockBox> HostBlocks::box_of(Holds holds) const {
   return box;
 }
 
-/// A block has cells that change where its dual cells have voxels on both sides: any two of these
+/// A block has cells that change if its dual cells have voxels on both sides: any two of these
 /// voxels are connected by cells of the block, so that one of the cells has both.
 void HostBlocks::select(float isovalue) {
   if (selected_ == isovalue) return;

@@ -104,7 +104,7 @@ inline void decode_stencil(const FrameParams &frame, const HostField &field, con
   if (!all_decoded) field.maker->decode({blocks, num_blocks});
 }
 
-/// Gives a hit the smooth gradient, where there is one.
+/// Gives a hit the smooth gradient, if there is one.
 inline void smooth_gradient(const FrameParams &frame, const HostField &field, LastPlanes last,
                             HitRecord *hit) {
   const Stencil s = stencil_of(block_coords(&frame, hit->block_id), hit->cell, last);

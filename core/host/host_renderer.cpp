@@ -148,7 +148,7 @@ void HostRenderer::add_ambient(const FrameRequest &request, FrameStats &stats) {
 
 /// Calls draw(tile, is_alone), as HostBlocks::run() does, for the tiles of all of the frame's rays,
 /// in bands of whole rows of pixels from the top; after each band, on_pass(after(percent of the
-/// rows that are done)). Returns false where that says to stop, and there is more to draw: bands,
+/// rows that are done)). Returns false if on_pass says to stop, and there is more to draw: bands,
 /// or what follows.
 template <class Draw, class After>
 bool HostRenderer::for_bands(const OnPass &on_pass, bool more_follows, Draw draw, After after) {

@@ -40,10 +40,10 @@ void convert_to_double(VoxelType type, std::span<const std::byte> voxels, std::s
 
 /// Reads the voxels that a header describes, whose info has passed check_volume_info(). Layers are
 /// read as they are asked for, in pieces. The reader throws Error where voxels cannot be unpacked
-/// or parsed, and with the last layer where the data does not end with it.
+/// or parsed, and with the last layer if the data does not end with it.
 ///
-/// Throws  Error before anything is allocated where the file has too few bytes for the voxels: by
-///         its exact length where they are not packed, by what could become of it where they are
+/// Throws  Error before anything is allocated if the file has too few bytes for the voxels: by
+///         its exact length if they are not packed, by what could become of it if they are
 std::unique_ptr<VolumeReader> open_voxels(const VolumeHeader &header);
 
 /// Opens a .raw or .raw.gz file; see open_volume.

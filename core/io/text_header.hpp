@@ -44,7 +44,7 @@ class HeaderLines {
   std::uint64_t end() const { return end_; }
 
  private:
-  /// Reads on where the buffer is used up. False at the end of the file.
+  /// Reads on when the buffer is used up. False at the end of the file.
   bool refill();
   /// Moves at most that many bytes of the buffer to the line. Returns whether it has ended.
   bool add_up_to(std::size_t most);
@@ -65,7 +65,7 @@ class HeaderFields {
 
   void add(std::string_view name, std::string_view value);
   bool has(std::string_view name) const { return fields_.find(name) != fields_.end(); }
-  /// Fails where the field is missing.
+  /// Fails if the field is missing.
   const std::string &operator[](std::string_view name) const;
   /// A number or an integer, the only one of the field.
   double number(std::string_view name) const;

@@ -19,7 +19,7 @@ bool is_space(char c) {
   return c == ' ' || (c >= '\t' && c <= '\r');
 }
 
-/// The nearest float, also of a number that only double holds. Empty where it is too large.
+/// The nearest float, also of a number that only double holds. Empty if it is too large.
 std::optional<float> parse_float(std::string_view text) {
   const std::optional<double> value = parse_number(text);
   if (!value) return std::nullopt;

@@ -3,7 +3,7 @@
 // headers (nrrd_header.hpp, meta_image_header.hpp, nifti_header.hpp) make it, open_voxels() in
 // raw_reader.hpp reads by it.
 //
-// World space of all formats: millimetres, and where the format is anatomical LPS (+x left, +y
+// World space of all formats: millimetres, and if the format is anatomical LPS (+x left, +y
 // posterior, +z superior), so that the same head has the same world coordinates from any of the
 // formats. Lengths in a unit that the file names are converted. A negative spacing is stored as a
 // flipped direction.
@@ -29,11 +29,10 @@ struct VoxelLayout {
   VoxelEncoding encoding = VoxelEncoding::kRaw;
   std::uint64_t offset = 0;  ///< bytes of the file before the voxels, but for what is skipped:
   std::uint64_t lines_to_skip = 0;  ///< lines of the file, and then
-  std::uint64_t bytes_to_skip =
-      0;  ///< bytes of it, or where it is compressed of what it unpacks to
+  std::uint64_t bytes_to_skip = 0;  ///< bytes of it, unpacked if it is compressed
   bool from_end =
       false;  ///< raw: the voxels are the last bytes of the file, whatever is before them
-  std::optional<std::uint64_t> packed_bytes;  ///< of compressed data, where the header says so
+  std::optional<std::uint64_t> packed_bytes;  ///< compressed bytes, if the header states them
   VoxelType type = VoxelType::kFloat32;       ///< as stored
   bool big_endian = false;
   /// A voxel's value is slope * stored + intercept.

@@ -26,7 +26,7 @@ enum class VertexPlaces {
   /// At least kLeastGap from the edge's voxels. So no two vertices meet, every triangle has an
   /// area, and the mesh stays closed for programs that merge vertices by their positions.
   kApart,
-  kExact  ///< where the field equals the isovalue; vertices meet on a voxel that equals it
+  kExact  ///< at the isovalue itself; vertices meet on a voxel that equals it
 };
 /// Least distance of a vertex from the voxels of its edge [edge lengths]. Two neighbours that are
 /// rounded to float32, each off by kPositionError at most, stay apart.

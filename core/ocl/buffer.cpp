@@ -88,7 +88,7 @@ struct Pages {
   void operator()(void *begin) const { platform::free_pages(begin, bytes); }
 };
 
-/// In pages of this process, all zero, which the system provides where they are written to.
+/// In pages of this process, all zero, which the system provides when they are written to.
 cl::Buffer make_in_pages(const cl::Context &context, std::size_t bytes) {
   std::error_code refusal;
   void *begin = platform::take_pages(bytes, platform::PageUse::kMost, refusal);

@@ -242,7 +242,7 @@ void prepare_for_drivers() {
   std::call_once(once, [] {
     complete_path();
     if (environment("POCL_CACHE_DIR").empty())
-      platform::unset_environment("POCL_CACHE_DIR");  // PoCL ends the process where it is empty
+      platform::unset_environment("POCL_CACHE_DIR");  // PoCL ends the process if it is empty
     for (std::size_t i = 0; i < kNumDrivers; ++i) state().folders[i] = choose_folder(i);
   });
 }

@@ -133,7 +133,7 @@ void MeshRenderer::plan_within_budget() {
   blocks_.open_cache(slots);
 }
 
-/// Has all that the surface needs cached, where there are as many slots. In one pass, since only
+/// Caches all blocks that the surface needs, if there are as many slots. In one pass, since only
 /// blocks that the same pass needs are never evicted.
 void MeshRenderer::bring_all() {
   const auto stage = device_.timer().stage("surface");
@@ -173,7 +173,7 @@ void MeshRenderer::make_mesh(std::uint64_t num_triangles) {
   }
 }
 
-/// Finds the blocks of the isovalue; and makes its mesh, where that can be kept.
+/// Finds the blocks of the isovalue, and makes its mesh if the mesh can be kept.
 void MeshRenderer::find_surface(float isovalue) {
   const bool is_bounded = options_.memory_budget != 0;
   is_kept_ = false;

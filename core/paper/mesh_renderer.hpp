@@ -28,34 +28,34 @@ namespace isowave::core {
 struct MeshRendererOptions {
   ImageSize size{};                         ///< the largest picture
   std::uint64_t memory_budget = 0;          ///< bound on all device memory [bytes]; 0: it may grow
-  StreamPlace stream = StreamPlace::kAuto;  ///< where the compressed volume is
+  StreamPlace stream = StreamPlace::kAuto;  ///< place of the compressed volume
 };
 
-/// What a frame took, beside FrameStats.
+/// Statistics of a frame of triangles, beside FrameStats.
 struct MeshFrameStats {
   bool is_new_surface = false;      ///< the blocks of the isovalue were found in this frame
   bool is_kept = false;             ///< the mesh stays on the device, for the next frame
-  std::uint64_t listed_blocks = 0;  ///< whose cells the surface may pass
+  std::uint64_t listed_blocks = 0;  ///< blocks whose cells the surface may pass
   std::uint64_t needed_blocks = 0;  ///< these and the neighbours that they need
-  std::uint64_t cached_blocks = 0;  ///< blocks in the cache, of other isovalues, too
+  std::uint64_t cached_blocks = 0;  ///< blocks in the cache, also of other isovalues
   std::uint64_t decoded_blocks = 0;
   std::uint32_t cache_slots = 0;
   std::uint64_t num_triangles = 0;
-  std::uint32_t num_parts = 0;     ///< that the mesh was drawn in
-  std::uint64_t device_bytes = 0;  ///< of all buffers
-  double surface_ms = 0;  ///< until the mesh was there; 0 where it is not kept, or was there
-  double draw_ms = 0;     ///< the rest of FrameStats::total_ms
+  std::uint32_t num_parts = 0;     ///< parts that the mesh was drawn in
+  std::uint64_t device_bytes = 0;  ///< bytes of all buffers
+  double surface_ms = 0;           ///< time of making the mesh; 0 if it is not kept, or was there
+  double draw_ms = 0;              ///< the rest of FrameStats::total_ms
 };
 
-/// Hits have the same bits on every device and with every budget. They differ from those of the ray
-/// pipelines as triangles do from the trilinear surface; gradients are the triangles' normals,
-/// directions alone, whatever FrameRequest::normals asks for.
+/// Draws triangles. Hits have the same bits on every device and with every budget. They differ from
+/// hits of the ray pipelines as triangles do from the trilinear surface. Gradients are the
+/// triangles' normals, with any FrameRequest::normals; only their directions count.
 class MeshRenderer : public Renderer {
  public:
   /// Uploads the volume and builds its macrocell ranges.
   ///
-  /// device  must outlive the renderer; volume, too
-  /// Throws  Error: options out of range, the device's memory or the budget does not suffice
+  /// device, volume  must outlive the renderer
+  /// Throws  Error: options out of range, not enough device memory or budget
   /// Waits   yes
   MeshRenderer(ocl::Device &device, const CompressedVolume &volume,
                const MeshRendererOptions &options);
@@ -63,22 +63,22 @@ class MeshRenderer : public Renderer {
   Abilities abilities() const override;
   std::vector<VolumeInfo> levels() const override { return {volume_.info}; }
 
-  /// Has one pass, after which on_pass is called.
+  /// Draws a frame in one pass, and then calls on_pass.
   ///
-  /// Returns  rays_hit 0: see num_hits()
-  /// Throws   Error: a budget that is too small, a surface that is too large for the device, too
+  /// Returns  statistics with rays_hit 0: see num_hits()
+  /// Throws   Error: also a budget that is too small, or a surface that is too large for the device
   FrameStats render(const FrameRequest &request) override;
-  /// Throws  Error: triangles are drawn from a camera alone
+  /// Throws  Error: triangles are drawn only from a camera
   std::vector<HitRecord> cast_rays(std::span<const WorldRay> rays, float isovalue,
                                    Normals normals) override;
   Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {}) override;
 
-  /// What the last frame took; of none, zeros.
+  /// Statistics of the last frame; zeros if there was none.
   const MeshFrameStats &last_frame() const { return last_; }
   ImageSize size() const override { return size_; }
   std::vector<HitRecord> hits() override;
   Image8 shade(const Appearance &appearance = {}) override;
-  /// Counts the hits of the last frame: render() does not.
+  /// Counts the hits of the last frame, which render() does not do.
   std::uint64_t num_hits(const FrameStats &stats) override;
 
   /// Forgets the mesh, too. The memory stays.

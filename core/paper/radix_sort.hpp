@@ -6,10 +6,10 @@
 
 namespace isowave::core {
 
-/// Who ranks the pairs of a tile (radix_sort.cl). The result is the same.
+/// The work-items that rank the pairs of a tile (radix_sort.cl). The result is the same.
 enum class RadixRanking {
   kTogether,  ///< all work-items of a group, a bit for each pair
-  kSerial     ///< one work-item of a group: where these are turns of a loop
+  kSerial     ///< one work-item of a group, on devices whose work-items are turns of a loop
 };
 
 class RadixSort {

@@ -43,7 +43,7 @@ void *take_pages(std::size_t bytes, PageUse use, std::error_code &failure) {
   void *const pages = mapped_or_null(
       ::mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | reserve, -1, 0),
       failure);
-  // A huge page would take 2 MiB where one of 4 KiB is written to. Systems without huge pages
+  // A huge page would take 2 MiB if only 4 KiB of it are written to. Systems without huge pages
   // refuse this, and may.
   if (pages != nullptr && use == PageUse::kFew) ::madvise(pages, bytes, MADV_NOHUGEPAGE);
   return pages;

@@ -28,7 +28,7 @@ struct RendererOptions {
   /// Whether packets decode the blocks that they come to; kAuto: if MarchPackets may.
   DecodeOnDemand on_demand = DecodeOnDemand::kAuto;
   std::uint32_t group_size = 64;            ///< work-items per work-group, a power of two in 8..256
-  StreamPlace stream = StreamPlace::kAuto;  ///< where the compressed volume is
+  StreamPlace stream = StreamPlace::kAuto;  ///< place of the compressed volume
   /// Bytes of one of its at most four buffers; 0: what the device allows.
   std::uint64_t largest_stream_part = 0;
   /// Blocks uploaded at a time from a volume on the host, at least 8; 0: by the size of cache and

@@ -318,7 +318,7 @@ bool is_own(const VolumePart *part, std::uint32_t z) {
 }
 
 /// Checks the rows of a chunk and has them coded, unless a voxel was refused: what follows is only
-/// counted then. source: of its voxels, where they are still to be cast.
+/// counted then. source: its voxels, if they are still to be cast.
 Findings code_rows(const Chunk &chunk, std::span<const double> source, const glm::uvec3 &dims,
                    const InputOptions &options, ChunkCoder &coder) {
   const std::uint64_t layer = std::uint64_t(dims.x) * dims.y, rows_per_slab = (dims.y + 3u) / 4u;

@@ -23,7 +23,7 @@ bool float32_holds_positions(const VolumeInfo &info) {
 }
 
 glm::dvec3 rounded_to_float32(const glm::dvec3 &position) {
-  // GCC 12 leaves out both conversions, to float32 and back, where it makes vectors of them.
+  // GCC 12 leaves out both conversions, to float32 and back, if it makes vectors of them.
   const auto rounded = [](double value) {
     const volatile float result = static_cast<float>(value);
     return double{result};

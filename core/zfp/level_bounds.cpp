@@ -191,7 +191,8 @@ float largest_bound(const BlockBounds &bounds) {
 double plane_error(const BlockPrecision &bound, double voxel_error) {
   const BlockPrecision fewer = with_fewer_planes(bound, voxel_error);
   if (fewer.min_exponent == bound.min_exponent) return 0;
-  // Values of all planes are rounded to integers, where that is meant, and those of fewer are not.
+  // Values of all planes are rounded to integers, if they are meant to be, and those of fewer are
+  // not.
   return std::ldexp(1.0, fewer.min_exponent) + (bound.whole_numbers ? 0.5 : 0.0);
 }
 

@@ -13,7 +13,7 @@ namespace isowave::core {
 
 namespace {
 
-/// Blocks along x that one work item decodes, and reads at once where they are neighbours.
+/// Blocks along x that one work item decodes, and reads at once if they are neighbours.
 constexpr std::uint32_t kRowBlocks = 64;
 
 /// The voxels of a region within a layer of blocks, along one axis.

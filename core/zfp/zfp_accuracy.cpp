@@ -209,8 +209,7 @@ BlockPrecision choose_by_tolerance(VolumeReader &reader, double tolerance,
   if (!best) {
     throw Error(
         "a tolerance of {} cannot be kept: voxels are stored as float32, and with all bit planes "
-        "off by up to {}; "
-        "give at least that",
+        "off by up to {}; give at least that",
         tolerance, printed_bound(meter.error(0)));
   }
   return *best;

@@ -106,7 +106,7 @@ std::uint64_t ZfpFileWriter::Part::write_index(const CompressedVolume &volume) {
   return size - begin;
 }
 
-/// Behind the index; returns its size, 0 where there are none.
+/// Writes the bounds behind the index; returns their size, 0 if there are none.
 std::uint64_t ZfpFileWriter::Part::write_bounds(const CompressedVolume &volume) {
   std::span<const std::uint8_t> left = volume.bounds.codes;
   if (left.empty()) return 0;
@@ -118,7 +118,7 @@ std::uint64_t ZfpFileWriter::Part::write_bounds(const CompressedVolume &volume) 
   return size - begin;
 }
 
-/// Behind the bounds; returns its size, 0 where all voxels have data.
+/// Writes the table of voxels without data behind the bounds; returns its size, 0 if there is none.
 std::uint64_t ZfpFileWriter::Part::write_no_data(const CompressedVolume &volume) {
   const std::span<const std::uint32_t> table = volume.no_data.table();
   if (table.empty()) return 0;

@@ -1,4 +1,4 @@
-/// ray_pairs.h -- where the pairs of an active ray lie, one behind the other along the ray.
+/// ray_pairs.h -- the places of an active ray's pairs, one behind the other along the ray.
 /// OpenCL C 1.2.
 ///
 /// Two ways (frame->schedule.scanned_pairs). 0: every ray has N_Spec places, the last ones of which

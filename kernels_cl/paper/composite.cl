@@ -8,8 +8,8 @@
 
 /// Ends the rays that hit.
 ///
-/// Out     hits [pixel] where a ray hit; ray_block_ids [pixel] where it waits for a block without
-///         slots; ray_active_mask [active_count]: 1 where it goes on; active_ray_ids: a ray that
+/// Out     hits [pixel] if a ray hit; ray_block_ids [pixel] if it waits for a block without
+///         slots; ray_active_mask [active_count]: 1 if it goes on; active_ray_ids: a ray that
 ///         moved on looks twice as far ahead
 /// Launch  grid-stride over the active rays
 kernel void composite(const FrameParams frame_params, global PassCounts *counts,

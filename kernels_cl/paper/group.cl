@@ -212,7 +212,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_co
 ///
 /// In      counts->granted_count, visible_count: 0
 /// Out     block_rays [visible_count], in any order; slot_offsets [slots]: where the pairs of each
-///         candidate begin, or ISO_INVALID_ID where it is not visible; slot_counts of the
+///         candidate begin, or ISO_INVALID_ID if it is not visible; slot_counts of the
 ///         candidates: 0, for the next pass
 /// Launch  groups stride over the candidates; each draws places with two global atomics a turn
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_blocks(

@@ -1,4 +1,5 @@
-/// cell_intersect.h -- where a ray first crosses the isosurface inside one dual cell (Sec. 3.7).
+/// cell_intersect.h -- the first crossing of a ray and the isosurface inside one dual cell (Sec.
+/// 3.7).
 ///
 /// Portable: OpenCL C 1.2 and C++; kernels and the scalar twin run these very lines.
 ///

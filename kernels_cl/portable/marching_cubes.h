@@ -123,7 +123,7 @@ ISO_INLINE float derivative_with_data(float below, float at, float above, int pl
 }
 
 /// The gradient at a vertex from those of its edge's voxels: the one of smooth_gradient.h.
-/// difference: upper voxel minus lower; taken alone where all others vanish.
+/// difference: upper voxel minus lower; taken alone if all others vanish.
 ISO_INLINE Gradient vertex_gradient(const float *lower, const float *upper, float t, uint axis,
                                     float difference) {
   Gradient g;

@@ -152,7 +152,7 @@ typedef struct Band {
 } Band;
 ISO_CHECK_SIZE(Band, 8);
 
-/// The isosurface, and where its blocks are.
+/// The isosurface, and the box of its blocks.
 typedef struct Surface {
   float isovalue;
   uint isovalue_index;  ///< the first threshold of macrocells.cl that is >= it
@@ -233,7 +233,7 @@ typedef struct GivenRay {
 } GivenRay;
 ISO_CHECK_SIZE(GivenRay, 28);
 
-/// Says where a compressed volume's blocks begin in its zfp stream, and how they are decoded.
+/// The places of a compressed volume's blocks in its zfp stream, and how they are decoded.
 typedef struct StreamLayout {
   uint bits_per_block;  ///< at a fixed rate; 0: blocks have lengths of their own, see block_index.h
   uint words_per_part;  ///< of a stream in several buffers: see block_stream.h

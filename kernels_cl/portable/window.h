@@ -4,7 +4,7 @@
 /// Portable: OpenCL C 1.2 and C++.
 ///
 /// The window of a pass: of the list of rays at work, the first so many take part. Not in the
-/// paper, where all do. A pass that found too few cache slots leaves fewer rays to the next.
+/// paper, in which all do. A pass that found too few cache slots leaves fewer rays to the next.
 #ifndef ISOWAVE_WINDOW_H
 #define ISOWAVE_WINDOW_H
 

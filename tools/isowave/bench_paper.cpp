@@ -86,7 +86,7 @@ struct FoundVolumes {
   std::vector<std::string> skipped;  ///< why, in a line each
 };
 
-/// Throws Error where a volume cannot be opened.
+/// Throws Error if a volume cannot be opened.
 void open_once(const std::string &path, const RawOverrides &overrides) {
   if (is_zfp_name(path)) {
     check_input_file(path);

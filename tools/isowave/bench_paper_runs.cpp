@@ -296,7 +296,7 @@ ordered_json measure_bcmc(const ocl::DeviceInfo &device_info, const PaperRun &ru
                  {"kept_percent", 100.0 * double(num_kept) / double(num_frames)},
                  {"cache_slots", slots.empty() ? 0.0 : *std::ranges::max_element(slots)}});
   } catch (const Error &error) {
-    device.finish();  // throws where the device itself has failed: that is no refusal
+    device.finish();  // throws if the device itself has failed, which is no refusal
     json["refused"] = error.what();
   }
   std::uint64_t cache_bytes = 0;

@@ -64,7 +64,7 @@ nlohmann::ordered_json measure_bcmc(const ocl::DeviceInfo &device, const PaperRu
 
 /// Pixels for which the default rays and the triangles agree, of the run's first isovalue and view:
 /// both have no hit, or hits within the diagonal of a voxel. {"percent": P, "hits_percent": H};
-/// null where the mesh is too large for the device.
+/// null if the mesh is too large for the device.
 ///
 /// pictures  names of files for both pictures: NAME_rays.png, NAME_bcmc.png; empty: none
 nlohmann::ordered_json compare_methods(const ocl::DeviceInfo &device, const PaperRun &run,

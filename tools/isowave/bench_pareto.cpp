@@ -93,7 +93,8 @@ struct Truth : View {
   Flip flip;
 };
 
-/// Angles between the gradients, in index space, where both have a hit: 99th percentile [degrees].
+/// Angles between the gradients, in index space, of pixels with a hit in both: 99th percentile
+/// [degrees].
 double normal_error(const View &truth, const View &view) {
   std::vector<double> angles;
   for (std::size_t i = 0; i < view.hits.size(); ++i) {
@@ -405,7 +406,7 @@ void choose(ocl::Device &device, const ParetoSubject &subject, const BenchPareto
 }
 
 /// Sets Point::over_front of the choices of --max-surface-error: how many times as long they take
-/// as the fastest point of the sweep that is no worse in any error; none, where all are worse. The
+/// as the fastest point of the sweep that is no worse in any error; none if all are worse. The
 /// two are drawn in turn, once more: of many points that take as long, the one that seemed to be
 /// the fastest mostly was lucky.
 void compare_choices(ocl::Device &device, const ParetoSubject &subject,

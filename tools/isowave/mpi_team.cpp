@@ -65,7 +65,7 @@ void for_pieces(std::span<Byte> bytes, const Use &use) {
 class HostWords {
  public:
   /// All processes make one. With ISOWAVE_HOST_RANKS=N, no more than N share memory, as if a host
-  /// had no more; and each is alone where the host has no shared memory to give.
+  /// had no more; and each is alone if the host has no shared memory to give.
   HostWords() {
     int world_rank = 0;
     MPI_Comm_rank(MPI_COMM_WORLD, &world_rank);
@@ -207,7 +207,7 @@ class HostWords {
            (num_words() * sizeof(std::uint64_t) + num_parts() * sizeof(std::uint32_t));
   }
 
-  /// False, at all processes, where one cannot. MPI's own shared memory leaves them waiting for
+  /// False, at all processes, if one cannot. MPI's own shared memory leaves them waiting for
   /// each other then.
   bool allocate() {
     std::array<char, 64> name{};  // empty: there is none

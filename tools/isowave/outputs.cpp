@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 namespace {
 
 /// The same for all names of a file that exists; for one that does not, its folder and name. Throws
-/// Error where it can be neither.
+/// Error if it can be neither.
 std::string key_of(const fs::path &path) {
   const fs::path target = follow_links(path);
   std::error_code failure, no_folder;

@@ -11,12 +11,12 @@ namespace isowave::core::tools {
 
 class Outputs {
  public:
-  /// A file that is read. Ignored where there is none (yet).
+  /// A file that is read. Ignored if there is none (yet).
   void read(const std::filesystem::path &path);
-  /// The volume and, where its header names them, the files of its voxels. generate:... is no file.
+  /// The volume and, if its header names them, the files of its voxels. generate:... is no file.
   void read_volume(const std::string &path);
 
-  /// A file that will be written, as `option` says; empty: none. Throws Error where it cannot be
+  /// A file that will be written, as `option` says; empty: none. Throws Error if it cannot be
   /// written, or is a file that read() or write() was called with: by any name, also through
   /// symbolic and hard links.
   void write(const std::string &option, const std::filesystem::path &path);

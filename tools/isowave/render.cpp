@@ -69,7 +69,7 @@ std::unique_ptr<ocl::Device> open_device(const RenderArgs &options, bool is_team
   return std::make_unique<ocl::Device>(info, !options.stats.empty() && !options.no_stage_times);
 }
 
-/// What the renderer must be made for, whatever the volume is.
+/// The options that the renderer must be made with, for any volume.
 void set_wanted(RenderArgs &options) {
   RendererOptions &wanted = options.renderer_flags.values;
   wanted.with_shading = asks_for_picture(options);

@@ -17,7 +17,7 @@ nlohmann::ordered_json detail_json(const Detail &detail) {
   return {{"voxel_pixels", detail.voxel_pixels}, {"voxel_error", detail.voxel_error}};
 }
 
-/// What the errors of a volume's voxels and levels come from, and so what bounds rest on.
+/// The source of the errors of a volume's voxels and levels, on which bounds rest.
 std::string_view errors_of(const CompressedVolume &volume) {
   return volume.errors_are_stated ? "stated" : "measured";
 }

@@ -1,5 +1,5 @@
 #pragma once
-// What `render` says of its frames: on the terminal, and in --stats.
+// Reports of `render` on its frames: on the terminal, and in --stats.
 
 #include <filesystem>
 #include <nlohmann/json.hpp>

@@ -19,10 +19,10 @@ void make_strict(CLI::App &app);
 /// and on `a,,b`.
 void refuse_empty_values(CLI::App &app, int argc, char **argv);
 
-/// All of the text as a decimal number; none where it is not, or out of range.
+/// The whole text as a decimal number; none if it is not one, or out of range.
 std::optional<std::uint64_t> parse_whole(std::string_view text);
 std::optional<double> parse_finite(std::string_view text);
-/// "12kB" is 12000, "1KiB" is 1024, "12" is 12; none where it is not such a number above 0, or more
+/// "12kB" is 12000, "1KiB" is 1024, "12" is 12; none if it is not such a number above 0, or more
 /// than 64 bits hold.
 std::optional<std::uint64_t> parse_bytes(std::string_view text);
 
@@ -35,7 +35,7 @@ CLI::Validator byte_count();
 /// A transformer: a whole number above 0, or "all" to 0.
 CLI::Validator count_or_all();
 
-/// Throws Error, "OPTION: WHY", where one of the options was given on the command line.
+/// Throws Error, "OPTION: WHY", if one of the options was given on the command line.
 void refuse_options(const CLI::App &command, std::initializer_list<const char *> names,
                     std::string_view why);
 

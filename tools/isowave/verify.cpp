@@ -51,7 +51,7 @@ std::uint64_t report_watertight(std::string_view by, const std::vector<Watertigh
   return leaks;
 }
 
-/// By the twin, and where there is a device by each of its pipelines. Returns the leaks.
+/// Tests the twin and, if there is a device, each of its pipelines. Returns the leaks.
 std::uint64_t verify_watertight(const VerifyArgs &options, Solver solver, ocl::Device *device,
                                 ordered_json &surfaces) {
   std::uint64_t leaks = 0;
@@ -70,7 +70,7 @@ std::uint64_t verify_watertight(const VerifyArgs &options, Solver solver, ocl::D
   return leaks;
 }
 
-/// The device that the watertight test is for; none where there is none.
+/// The device that the watertight test is for; none if there is no device.
 std::unique_ptr<ocl::Device> open_device(const VerifyArgs &options) {
   if (options.watertight == 0) return nullptr;
   if (options.frames.device.empty() && ocl::list_devices().empty()) {

@@ -81,7 +81,7 @@ inline constexpr const char *kVolumeHelp =
     "generate:FIELD_XxYxZ_TYPE[:SEED]";
 
 /// Opens a .zfp file (its spacing may be overridden; options of how to compress are refused), or
-/// compresses any other volume, at a rate on `device` where one is given. Clears that device's
+/// compresses any other volume, at a rate on `device` if one is given. Clears that device's
 /// stage times. Throws Error also on what cannot be drawn.
 CompressedVolume load_volume(const std::string &path, const RawOverrides &overrides,
                              const CompressionOptions &compression, ocl::Device *device = nullptr);

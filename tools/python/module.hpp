@@ -224,7 +224,7 @@ nb::object call(const nb::callable &function, const Args &...args) {
 /// of what leaves a callback, and raises it again when the library has returned.
 class Callbacks {
  public:
-  /// Calls work() with the GIL held. Returns false where that, or an earlier callback, has raised
+  /// Calls work() with the GIL held. Returns false if that, or an earlier callback, has raised
   /// something, or a signal came (Ctrl-C).
   template <class Work>
   bool run(const Work &work) {

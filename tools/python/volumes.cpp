@@ -25,7 +25,8 @@ std::string type_name(isowave::VoxelType type) {
   return kTypeNames.at(static_cast<std::size_t>(type));
 }
 
-/// Where an array's voxels are, and their type: dims, spacing, origin, direction as isowave::Grid.
+/// The type of an array's voxels, and their places: dims, spacing, origin, direction as
+/// isowave::Grid.
 using PyGrid = std::tuple<std::string, Index3, Vector3, Vector3, std::array<Vector3, 3>>;
 
 isowave::Grid grid_of(const PyGrid &grid) {

@@ -1,5 +1,5 @@
 #pragma once
-// Where a picture is taken from.
+// Cameras and sizes of pictures.
 
 #include <array>
 #include <cstdint>

@@ -1,5 +1,5 @@
 #pragma once
-// What a frame is asked for, and what comes back.
+// Requests of frames, and the frames that come back.
 
 #include <array>
 #include <cstdint>

@@ -14,12 +14,12 @@
 
 namespace isowave {
 
-/// Where vertices are on the edges between voxels.
+/// Places of vertices on the edges between voxels.
 enum class VertexPlaces {
   /// At least 1/1024 of the edge away from its voxels. So no two vertices meet, every triangle has
   /// an area, and programs that merge vertices by position find the mesh closed.
   kApart,
-  kExact  ///< where the field equals the isovalue; vertices meet on a voxel that equals it
+  kExact  ///< at the isovalue itself; vertices meet on a voxel that equals it
 };
 
 struct ExtractOptions {

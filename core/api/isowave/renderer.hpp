@@ -16,7 +16,7 @@ namespace isowave {
 class Device;
 struct DeviceInfo;
 
-/// What a renderer is made for. A renderer takes its memory when it is made. Without memory_budget
+/// Options of a renderer. A renderer takes its memory when it is made. Without memory_budget
 /// and cache_blocks, the cache grows between frames if frames need more blocks.
 struct RendererOptions {
   ImageSize largest{};              ///< largest picture: frames may have as many rays, in any shape

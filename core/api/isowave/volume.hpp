@@ -32,7 +32,7 @@ enum class VoxelType {
   kInt64    ///< as kUint64
 };
 
-/// Where voxels are: world = origin + direction * (spacing * index), index (i,j,k) of a voxel.
+/// Places of voxels: world = origin + direction * (spacing * index), index (i,j,k) of a voxel.
 struct Grid {
   std::array<std::uint32_t, 3> dims{};  ///< voxels along x, y, z: 2 to 65,536 each
   Vector3 spacing{1, 1, 1};             ///< world units between voxels along x, y, z; above 0
@@ -68,7 +68,8 @@ struct Compression {
   std::function<void(std::string_view what, double done)> progress{};
 };
 
-/// What the name of a raw file does not say. `NAME_XxYxZ_TYPE.raw` and `.raw.gz` say it.
+/// Facts that the name of a raw file does not state. `NAME_XxYxZ_TYPE.raw` and `.raw.gz` state
+/// them.
 struct RawFile {
   std::optional<std::array<std::uint32_t, 3>> dims{};
   std::optional<VoxelType> type{};

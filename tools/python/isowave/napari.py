@@ -204,7 +204,7 @@ def add_isosurface(
     ValueError
         The viewer does not show (z, y, x) in 3D, or no ray hits the surface.
     """
-    order = tuple(viewer.dims.order)  # two axes where the viewer is empty
+    order = tuple(viewer.dims.order)  # two axes if the viewer is empty
     if viewer.dims.ndisplay != 3 or len(order) > 3 or order != tuple(sorted(order)):
         raise ValueError("the viewer does not show (z, y, x) in 3D: viewer.dims.ndisplay = 3")
     scene = getattr(viewer, "scene", viewer)  # it has the camera since napari 0.9

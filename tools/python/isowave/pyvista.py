@@ -44,7 +44,7 @@ PLANES = "isowavePlanes"
 
 # The actor's bounds must be the volume's: PyVista sets cameras and clipping planes by them. So its
 # points are the corners of the volume's box. The shader moves the first four to the corners of the
-# view, and the others to one point, where they cover no pixel.
+# view, and the others to one point, at which they cover no pixel.
 VERTEX = {
     "PositionVC::Dec": "out vec2 isowavePlace;\n",
     "PositionVC::Impl": """
@@ -84,7 +84,7 @@ class Isosurface:
         self, plotter: Any, volume: Volume, request: Request, **renderer_options: Any
     ) -> None:
         self.volume = volume
-        self.isovalue = request.isovalue  #: the surface is where the field crosses this value
+        self.isovalue = request.isovalue  #: value of the field on the surface
         self.color = request.color
         self.image: Image | None = None  #: the last picture, with "rgb" and "depth"
         self.error: Exception | None = None  #: why the last frame was drawn without the surface

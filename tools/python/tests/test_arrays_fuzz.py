@@ -390,7 +390,7 @@ def test_vtk():
     except ImportError:
         vtkImageData = None
 
-    # VTK crashes by itself where it is asked for others, as voxels of text.
+    # VTK crashes by itself if it is asked for others, as voxels of text.
     numeric_kinds = [kind for kind in range(1, 18) if kind not in (13, 14)]
 
     class Scalars(np.ndarray):

@@ -229,7 +229,7 @@ def test_picture_is_that_of_render(plotter, volume):
     hit = np.isfinite(surface.image.depth)
     alone = volume.render(RADIUS, size=SIZE, camera=surface.image.camera, color=GREY)
     assert (alone.depth == surface.image.depth).all()
-    # VTK smooths edges by several samples of a pixel: only where all eight neighbours are hit.
+    # VTK smooths edges by several samples of a pixel: only if all eight neighbours are hit.
     inner = hit.copy()
     for axis in (0, 1):
         for step in (-1, 1):
