@@ -83,6 +83,41 @@ class CacheModel {
     ASSERT_TRUE(std::ranges::includes(wanted_, requests)) << "requests";
   }
 
+  /// What was evicted is not of the first pair, and was used before all that was kept.
+  ///
+  /// slots       what they hold now
+  /// into        the slots of the decode list
+  /// first_grid  blocks of the pair served first
+  void check_evictions(const StageWorld &world, const std::vector<uint> &slots,
+                       const std::set<uint> &into, const std::set<uint> &first_grid) {
+    const uint num_slots = static_cast<uint>(slots_.size());
+    Order last_evicted{kEarlier, std::numeric_limits<int>::min()}, first_kept{kNever, 0};
+    uint spared = 0, recycled = 0;
+    find_last_uses();
+    for (uint slot = 0; slot < num_slots; ++slot) {
+      if (into.contains(slot)) {
+        if (slots_[slot] != ISO_INVALID_ID) recycled += last_uses_[slot] >= frame_begin_;
+        ASSERT_FALSE(first_grid.contains(slots_[slot])) << "a block of the first pair was evicted";
+        if (slots_[slot] != ISO_INVALID_ID) last_evicted = std::max(last_evicted, order(slot));
+      } else if (slots[slot] == ISO_INVALID_ID && slots_[slot] != ISO_INVALID_ID) {
+        ASSERT_EQ(order(slot), Order(kEarlier, -static_cast<int>(kOldest)))
+            << "freed without need, though still of use";
+        slots_[slot] = ISO_INVALID_ID;
+        ++spared;
+      } else {
+        ASSERT_EQ(slots[slot], slots_[slot])
+            << "slot " << slot << " changed and is not in the decode list";
+        if (slots_[slot] != ISO_INVALID_ID && !first_grid.contains(slots_[slot]))
+          first_kept = std::min(first_kept, order(slot));
+      }
+    }
+    ASSERT_LE(spared, num_slots / 16);
+    num_spared += spared;
+    ASSERT_LE(last_evicted, first_kept) << "a block was evicted before one that was kept";
+    ASSERT_EQ(world.counts().recycled_count, recycled);
+    num_recycled += recycled;
+  }
+
   void check_assignment(const StageWorld &world, const std::vector<uint> &pairs) {
     const uint num_slots = static_cast<uint>(slots_.size());
     const uint decoded = world.counts().decoded_count;
@@ -108,33 +143,9 @@ class CacheModel {
     ASSERT_EQ(blocks.size(), decoded);
     ASSERT_EQ(into.size(), decoded);
     ASSERT_TRUE(std::ranges::includes(wanted_, blocks));
-    Order last_evicted{kEarlier, std::numeric_limits<int>::min()}, first_kept{kNever, 0};
-    uint spared = 0, recycled = 0;
-    bool stole = false;
-    find_last_uses();
-    for (uint slot = 0; slot < num_slots; ++slot) {
-      if (into.contains(slot)) {
-        stole |= used_[slot] == now_;
-        if (slots_[slot] != ISO_INVALID_ID) recycled += last_uses_[slot] >= frame_begin_;
-        ASSERT_FALSE(first_grid.contains(slots_[slot])) << "a block of the first pair was evicted";
-        if (slots_[slot] != ISO_INVALID_ID) last_evicted = std::max(last_evicted, order(slot));
-      } else if (slots[slot] == ISO_INVALID_ID && slots_[slot] != ISO_INVALID_ID) {
-        ASSERT_EQ(order(slot), Order(kEarlier, -static_cast<int>(kOldest)))
-            << "freed without need, though still of use";
-        slots_[slot] = ISO_INVALID_ID;
-        ++spared;
-      } else {
-        ASSERT_EQ(slots[slot], slots_[slot])
-            << "slot " << slot << " changed and is not in the decode list";
-        if (slots_[slot] != ISO_INVALID_ID && !first_grid.contains(slots_[slot]))
-          first_kept = std::min(first_kept, order(slot));
-      }
-    }
-    ASSERT_LE(spared, num_slots / 16);
-    num_spared += spared;
-    ASSERT_LE(last_evicted, first_kept) << "a block was evicted before one that was kept";
-    ASSERT_EQ(world.counts().recycled_count, recycled);
-    num_recycled += recycled;
+    check_evictions(world, slots, into, first_grid);
+    if (testing::Test::HasFatalFailure()) return;
+    const bool stole = std::ranges::any_of(into, [&](uint slot) { return used_[slot] == now_; });
     if (stole) {
       ASSERT_EQ(decoded, first_missing)
           << "slots of this pass were taken, and not for the first pair";

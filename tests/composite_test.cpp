@@ -29,7 +29,42 @@ class CompositeOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     }
   }
 
+  /// Rays, and what was found in the blocks of their lists.
+  struct Found {
+    std::vector<uint> active{};      ///< pixels, ascending
+    std::vector<uint> states{};      ///< [pixel]; some have left the volume behind their last block
+    std::vector<uint> pairs{};       ///< [ray][spec_count] blocks
+    std::vector<PairHit> results{};  ///< of the pairs
+  };
+
   /// In `one_in` results, one is a hit and one was not tested.
+  static Found random_found(const FrameParams &frame, uint spec_count, uint one_in,
+                            Random &random) {
+    const uint num_pixels = frame.view.width * frame.view.height;
+    Found found;
+    for (uint pixel = 0; pixel < num_pixels && (found.active.size() + 1) * spec_count <= num_pixels;
+         ++pixel) {
+      if (random() % 3 != 0) found.active.push_back(pixel);
+    }
+    found.states.resize(num_pixels);
+    for (uint &state : found.states) state = random() % 2 ? ISO_INVALID_ID : 1000 + random() % 1000;
+    for (std::size_t a = 0; a < found.active.size(); ++a) {
+      const uint length = random() % (spec_count + 1);
+      for (uint k = 0; k < spec_count; ++k) {
+        found.pairs.push_back(k < length ? random() % (4 * 4 * 3) : ISO_INVALID_ID);
+        const uint kind = random() % one_in;
+        PairHit result{ISO_NO_HIT, 0.0f};
+        if (kind == 1 || found.pairs.back() == ISO_INVALID_ID) result.cell = ISO_NOT_TESTED;
+        if (kind == 0 && found.pairs.back() != ISO_INVALID_ID) {
+          result = {random_cell(frame, found.pairs.back(), random),
+                    static_cast<float>(random() >> 8) * 0x1p-24f};
+        }
+        found.results.push_back(result);
+      }
+    }
+    return found;
+  }
+
   void expect_composite(ImageSize size, uint spec_count, uint one_in, uint seed, ClosestHit how,
                         uint per_ray) {
     SCOPED_TRACE(fmt::format("{} x {}, spec count {}, one in {}, seed {}, {}, per ray {}",
@@ -42,32 +77,10 @@ class CompositeOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     StageWorld world(device_, frame, 4 * 4 * 3, 8);
     fill_cache(world, voxels);
 
-    /* Rays: a random ascending part of the pixels. Some have left the volume behind their last
-     * block. */
+    const Found found = random_found(frame, spec_count, one_in, random);
+    const auto &[active, all_states, pairs, results] = found;
+    std::vector<uint> states = all_states;
     const uint num_pixels = static_cast<uint>(size.num_pixels());
-    std::vector<uint> active;
-    for (uint pixel = 0; pixel < num_pixels && (active.size() + 1) * spec_count <= num_pixels;
-         ++pixel) {
-      if (random() % 3 != 0) active.push_back(pixel);
-    }
-    std::vector<uint> states(num_pixels);
-    for (uint &state : states) state = random() % 2 ? ISO_INVALID_ID : 1000 + random() % 1000;
-    std::vector<uint> pairs;
-    std::vector<PairHit> results;
-    for (std::size_t a = 0; a < active.size(); ++a) {
-      const uint length = random() % (spec_count + 1);
-      for (uint k = 0; k < spec_count; ++k) {
-        pairs.push_back(k < length ? random() % (4 * 4 * 3) : ISO_INVALID_ID);
-        const uint kind = random() % one_in;
-        PairHit result{ISO_NO_HIT, 0.0f};
-        if (kind == 1 || pairs.back() == ISO_INVALID_ID) result.cell = ISO_NOT_TESTED;
-        if (kind == 0 && pairs.back() != ISO_INVALID_ID) {
-          result = {random_cell(frame, pairs.back(), random),
-                    static_cast<float>(random() >> 8) * 0x1p-24f};
-        }
-        results.push_back(result);
-      }
-    }
     std::vector<HitRecord> expected_hits(num_pixels, no_hit());
     world.rays.hits.write(expected_hits);
     world.rays.ray_block_ids.write(states);

@@ -315,6 +315,40 @@ TEST_P(TraverseOnDevice, MasksOfAnIsovalue) {
   EXPECT_GT(num_pairs, 100u);
 }
 
+/// After a pass with scanned places: each ray of the window has the next blocks of its list,
+/// counts.spec_count or what is left, of which the pass has counted up to `counted`, and the places
+/// of the next ray begin where its own end.
+///
+/// done   [pixel] how many blocks of its list a ray has had; goes on
+/// still  becomes the rays that are still on their way
+void expect_pairs(const Wavefront &rays, const PassCounts &counts, uint counted,
+                  const std::vector<uint> &active, const BlockLists &expected,
+                  std::vector<std::size_t> &done, std::vector<uint> &still) {
+  const std::vector<uint> begins = rays.pair_begins.read(), of = rays.pair_rays.read(),
+                          blocks = rays.pair_block_ids.read(), stands = rays.ray_block_ids.read(),
+                          closest = rays.closest_pairs.read();
+  uint place = 0;
+  for (uint a = 0; a < active.size(); ++a) {
+    const uint ray = active[a];
+    if (a < counts.window_count) {
+      ASSERT_EQ(begins[a], place) << a;
+      const std::size_t there = std::min<std::size_t>(expected[ray].size() - done[ray], counted),
+                        own = std::min<std::size_t>(there, counts.spec_count);
+      for (std::size_t k = 0; k < own; ++k, ++place) {
+        ASSERT_EQ(blocks[place], expected[ray][done[ray]++]) << "ray " << ray;
+        ASSERT_EQ(of[place], a);
+      }
+      ASSERT_EQ(closest[a], ISO_INVALID_ID);
+      const bool is_through = stands[ray] == ISO_INVALID_ID;
+      ASSERT_TRUE(is_through || own != there || there == counted)
+          << "not as soon as it has looked at its last block";
+      ASSERT_TRUE(!is_through || done[ray] == expected[ray].size()) << "blocks are left out";
+    }
+    if (stands[ray] != ISO_INVALID_ID) still.push_back(ray);
+  }
+  ASSERT_EQ(begins[counts.window_count], place);
+}
+
 /// All passes of a frame with scanned places, against the lists of the walk: N_Spec is the most for
 /// which there are places enough, each ray gets that many or what is before it, and the places of
 /// the next ray begin where its own end. The first pass takes a third of the rays alone.
@@ -379,31 +413,9 @@ TEST_P(TraverseOnDevice, SmallScannedPlaces) {
       counts.pair_count = counts.pair_slot_count = static_cast<uint>(places(spec_count));
       counts.ahead_count = counts.window_count * spec_count;
       expect_counts(rays.counts, counts);
-      const std::vector<uint> begins = rays.pair_begins.read(), of = rays.pair_rays.read(),
-                              blocks = rays.pair_block_ids.read(),
-                              stands = rays.ray_block_ids.read(),
-                              closest = rays.closest_pairs.read();
-      uint place = 0;
       std::vector<uint> still;
-      for (uint a = 0; a < active.size(); ++a) {
-        const uint ray = active[a];
-        if (a < counts.window_count) {
-          ASSERT_EQ(begins[a], place) << a;
-          const std::size_t there = std::min<std::size_t>(left(a), counted),
-                            own = std::min<std::size_t>(there, spec_count);
-          for (std::size_t k = 0; k < own; ++k, ++place) {
-            ASSERT_EQ(blocks[place], expected[ray][done[ray]++]) << "ray " << ray;
-            ASSERT_EQ(of[place], a);
-          }
-          ASSERT_EQ(closest[a], ISO_INVALID_ID);
-          const bool is_through = stands[ray] == ISO_INVALID_ID;
-          ASSERT_TRUE(is_through || own != there || there == counted)
-              << "not as soon as it has looked at its last block";
-          ASSERT_TRUE(!is_through || done[ray] == expected[ray].size()) << "blocks are left out";
-        }
-        if (stands[ray] != ISO_INVALID_ID) still.push_back(ray);
-      }
-      ASSERT_EQ(begins[counts.window_count], place);
+      expect_pairs(rays, counts, counted, active, expected, done, still);
+      if (HasFatalFailure()) return;
       active = still;
     }
     for (uint ray = 0; ray < num_pixels; ++ray) ASSERT_EQ(done[ray], expected[ray].size());

@@ -4,7 +4,7 @@ its own, the head first."""
 import pathlib
 import statistics
 
-from measuring import bricks, paper
+from measuring import bricks, paper_article, paper_tables
 from measuring.cells import mebibytes, ms, name_of, percent
 
 
@@ -460,8 +460,8 @@ TABLES = {
         ("stability", stability, leaks),
         ("cpus", cpus),
         ("peer", peer),
-        ("paper", *paper.TABLES),
-        ("devices", paper.by_device),
+        ("paper", *paper_article.TABLES, *paper_tables.TABLES),
+        ("devices", paper_tables.by_device),
         ("bricks", bricks.in_bricks),
         ("bits", bits),
         ("oracles", oracles),

@@ -23,6 +23,7 @@ import isowave
 pytest.importorskip("anywidget")
 
 from isowave.viewer import widget as widget_module  # noqa: E402
+from isowave.viewer.front_end import PARTS, script  # noqa: E402
 from isowave.viewer.widget import MAX_VIEWS, Widget, show  # noqa: E402
 
 TIMEOUT = 60  # seconds; for machines that are busy with other things
@@ -143,9 +144,11 @@ def test_widgets_of_a_volume_share_a_renderer() -> None:
 
 
 def test_the_widget_carries_the_module() -> None:
-    script = Path(widget_module.__file__).with_name("view.js").read_text()
-    assert str(Widget._esm) == script and "export default" in script
-    assert not re.search(r"^\s*import\b", script, re.MULTILINE)
+    module = script()
+    assert str(Widget._esm) == module and module.count("export default") == 1
+    assert not re.search(r"^\s*import\b", module, re.MULTILINE)
+    parts = Path(widget_module.__file__).parent.glob("*.js")
+    assert {part.name for part in parts} == set(PARTS)
 
 
 NOTEBOOK_CELL = """\

@@ -32,6 +32,7 @@ from websockets.protocol import State
 from websockets.server import ServerProtocol
 
 from .door import HEADERS, Door, Refused, Request, answer, hand_over, parse_head, read_head
+from .front_end import script
 from .interfaces import VolumeLike
 from .protocol import MAX_MESSAGE_BYTES, ProtocolError, parse
 from .scene import Scene
@@ -238,10 +239,11 @@ class Server:
         name = request.path.removeprefix(f"/{self.token}/")
         if name == "":
             policy = POLICY.format(host=request.only("host"))
-            page, kind = _read("page.html"), "text/html; charset=utf-8"
+            page, kind = _read_page(), "text/html; charset=utf-8"
             return answer(200, page, kind, with_body=with_body, Content_Security_Policy=policy)
         if name == "view.js":
-            return answer(200, _read(name), "text/javascript; charset=utf-8", with_body=with_body)
+            kind = "text/javascript; charset=utf-8"
+            return answer(200, script().encode(), kind, with_body=with_body)
         raise Refused(403)
 
 
@@ -414,8 +416,8 @@ class _Connection:
                         raise _Ended(POLICY_VIOLATION, NOT_READ) from None
 
 
-def _read(name: str) -> bytes:
-    return resources.files(__package__).joinpath(name).read_bytes()
+def _read_page() -> bytes:
+    return resources.files(__package__).joinpath("page.html").read_bytes()
 
 
 def _listen(host: str, port: int) -> socket.socket:

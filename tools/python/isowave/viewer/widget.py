@@ -1,4 +1,4 @@
-"""The viewer as a Jupyter widget: the same view.js, through the kernel's channel. No ports.
+"""The viewer as a Jupyter widget: the same front end, through the kernel's channel. No ports.
 
 A widget may be displayed several times, in several windows: each view has its own state.
 """
@@ -8,12 +8,12 @@ from __future__ import annotations
 import asyncio
 import threading
 from collections import OrderedDict
-from importlib import resources
 from typing import Any, Final
 
 import anywidget
 import traitlets
 
+from .front_end import script
 from .interfaces import VolumeLike
 from .protocol import ProtocolError
 from .scene import Scene
@@ -28,7 +28,7 @@ class Widget(anywidget.AnyWidget):
     height  height of the widget [CSS pixels]
     """
 
-    _esm = resources.files(__package__).joinpath("view.js").read_text()
+    _esm = script()
     height = traitlets.Int(540, min=200, max=4000).tag(sync=True)
 
     def __init__(self, scene: Scene, **traits: Any) -> None:

@@ -1,0 +1,158 @@
+// markup.js -- the elements of a view, and how they look. A part of an ES module (front_end.py).
+
+const THUMB = 12; // width of the slider's thumb, CSS pixels
+
+const HTML = `
+<div class="frame">
+  <section class="stage" aria-label="Picture">
+    <canvas class="picture" tabindex="0" role="application" aria-describedby="keys"
+      aria-label="Isosurface; arrow keys turn it"></canvas>
+    <div class="bar" aria-hidden="true"></div>
+    <p class="note" role="alert" hidden></p>
+    <button class="toggle" type="button" aria-controls="panel" aria-expanded="true">Panel</button>
+  </section>
+  <section class="iso" aria-label="Isovalue">
+    <label class="number">Isovalue
+      <input name="isovalue" type="number" step="any" min="-3.4e38" max="3.4e38" required></label>
+    <div class="histogram">
+      <canvas aria-hidden="true"></canvas>
+      <input name="slider" type="range" aria-label="Isovalue on the histogram" min="0" max="1">
+      <div class="ends" aria-hidden="true">
+        <span></span><span>voxels, log scale</span><span></span></div>
+    </div>
+  </section>
+  <aside class="panel" id="panel" aria-label="Settings">
+    <h1></h1><p class="volume"></p>
+    <div class="buttons">
+      <button type="button" name="reset">Reset view</button>
+      <button type="button" name="shot">Screenshot</button>
+      <button type="button" name="copy">Copy camera</button>
+      <button type="button" name="paste" aria-expanded="false">Paste camera</button>
+    </div>
+    <form class="paste" hidden>
+      <label>Camera file (JSON)
+        <textarea name="camera" rows="4" spellcheck="false"></textarea></label>
+      <p class="problem" role="alert"></p>
+      <div class="buttons">
+        <button>Use it</button><button type="button" name="cancel">Cancel</button></div>
+    </form>
+    <h2>Colour</h2>
+    <label>Surface <input name="color" type="color"></label>
+    <label>Background <input name="background" type="color"></label>
+    <h2>Quality</h2>
+    <label>Largest error <span class="unit"><input name="max_error" type="number"
+      min="0.001" max="1000"
+      step="any" placeholder="none"> px</span></label>
+    <label>Samples per pixel <select name="samples"><option value="1">1</option>
+      <option value="2">4</option><option value="3">9</option><option value="4">16</option></select>
+    </label>
+    <label title="Rays of each point that find out how much of the sky it sees">Ambient rays
+      <select name="ambient"><option value="0">none</option>${
+  AMBIENT.map((n) => `<option>${n}</option>`).join("")}</select></label>
+    <label>Time budget <span class="unit"><input name="time_budget" type="number"
+      min="1" max="10000" step="any"
+      placeholder="none"> ms</span></label>
+    <h2>Device</h2>
+    <form class="budget"><label>Memory budget <span class="unit"><input name="budget" type="number"
+      min="1"
+      max="9000000" step="1" placeholder="default"> MiB</span></label></form>
+    <dl class="device"></dl>
+    <h2>This picture</h2>
+    <dl class="facts"></dl>
+    <details><summary>Keys and gestures</summary><p id="keys">Drag, one finger or arrow keys: turn.
+      Right drag, shift and drag, two fingers or shift and arrows: move. Wheel, pinch, + and −:
+      zoom. 0 or double click: reset. The keys work while the picture has the focus.</p></details>
+  </aside>
+  <p class="said" role="status"></p>
+</div>`;
+
+const CSS = `
+:host { display: block; container-type: size; position: relative; overflow: hidden;
+  --back: light-dark(#f3f4f6, #14171a); --card: light-dark(#ffffff, #1b1f24);
+  --text: light-dark(#1b2128, #e5e9ed); --soft: light-dark(#55606b, #a2adb8);
+  --line: light-dark(#d9dde2, #30363d); --edge: light-dark(#7c8791, #7d8894);
+  --field: light-dark(#ffffff, #14171a); --accent: light-dark(#0b63a5, #74b7f0);
+  --bars: light-dark(#9aa5b1, #5c6873); --bad: light-dark(#a3231c, #ff9d92);
+  color: var(--text); background: var(--back); color-scheme: light dark;
+  font: 13px/1.45 system-ui, "Segoe UI", Roboto, "Helvetica Neue", sans-serif; }
+* { box-sizing: border-box; }
+[hidden] { display: none !important; }
+.frame { display: grid; height: 100%; grid: minmax(0, 1fr) auto / minmax(0, 1fr) auto;
+  grid-template-areas: "stage panel" "iso panel"; }
+.stage { grid-area: stage; position: relative; min-height: 0; }
+.picture { position: absolute; inset: 0; width: 100%; height: 100%; touch-action: none;
+  cursor: grab; }
+.picture:active { cursor: grabbing; }
+.bar { position: absolute; inset: 0 auto auto 0; height: 2px; width: 0; background: var(--accent);
+  opacity: 0; transition: width .15s, opacity .3s .2s; }
+.bar.busy { opacity: 1; }
+.note { position: absolute; left: 12px; bottom: 12px; max-width: calc(100% - 24px); margin: 0;
+  padding: 8px 12px; border: 1px solid var(--edge); border-radius: 6px; background: var(--card); }
+.toggle { position: absolute; top: 10px; right: 10px; }
+.iso { grid-area: iso; display: flex; gap: 16px; align-items: start; padding: 10px 16px 8px;
+  background: var(--card); border-top: 1px solid var(--line); }
+.iso .number { display: block; width: 104px; flex: none; }
+.iso .number input { width: 100%; margin-top: 2px; }
+.histogram { position: relative; flex: 1; min-width: 0; }
+.histogram canvas { color: var(--accent); outline: 0 solid var(--bars); display: block;
+  width: 100%; height: 44px; }
+.histogram input { position: absolute; inset: 0 0 auto; width: 100%; height: 44px; margin: 0;
+  appearance: none; background: none; cursor: ew-resize; border-radius: 3px; }
+.histogram input::-webkit-slider-thumb { appearance: none; width: ${THUMB}px; height: 44px;
+  background: linear-gradient(var(--accent), var(--accent)) center / 2px 100% no-repeat,
+    radial-gradient(circle at 50% 50%, var(--accent) 5px, transparent 5.8px); }
+.histogram input::-moz-range-thumb { width: ${THUMB}px; height: 44px; border: 0; border-radius: 0;
+  background: linear-gradient(var(--accent), var(--accent)) center / 2px 100% no-repeat,
+    radial-gradient(circle at 50% 50%, var(--accent) 5px, transparent 5.8px); }
+.ends { display: flex; justify-content: space-between; padding: 0 ${THUMB / 2}px;
+  color: var(--soft); font-size: 11px;
+  font-variant-numeric: tabular-nums; }
+.panel { grid-area: panel; width: 268px; padding: 12px 14px; overflow: auto;
+  background: var(--card); border-left: 1px solid var(--line); }
+.panel h1 { margin: 0; font-size: 14px; font-weight: 600; overflow-wrap: anywhere; }
+.panel h2 { margin: 14px 0 4px; font-size: 11px; font-weight: 600; color: var(--soft);
+  letter-spacing: .04em; text-transform: uppercase; }
+.volume { margin: 0 0 10px; color: var(--soft); font-size: 12px; }
+.panel label { display: flex; justify-content: space-between; align-items: center; gap: 8px;
+  min-height: 30px; }
+.panel :is(select, input[type=color]) { flex: none; width: 76px; margin-right: 32px; }
+.buttons { display: grid; grid-template-columns: 1fr 1fr; gap: 6px; }
+.paste { margin-top: 8px; }
+.paste label { display: block; }
+.problem { margin: 4px 0; color: var(--bad); }
+button, input, select, textarea { font: inherit; color: inherit; }
+button, input[type=number], select, textarea { border: 1px solid var(--edge); border-radius: 4px;
+  background: var(--field); padding: 0 8px; height: 28px; }
+button { cursor: pointer; background: var(--card); white-space: nowrap; }
+button:hover { border-color: var(--accent); color: var(--accent); }
+.unit { display: grid; grid-template-columns: 76px 26px; align-items: center; gap: 6px; }
+.panel input[type=number] { width: 100%; text-align: right; appearance: textfield; }
+input::-webkit-inner-spin-button { display: none; }
+input::placeholder { color: var(--soft); opacity: 1; }
+input[type=color] { height: 26px; padding: 2px; border: 1px solid var(--edge);
+  border-radius: 4px; background: var(--field); cursor: pointer; }
+input:invalid { border-color: var(--bad); outline-color: var(--bad); }
+textarea { width: 100%; height: auto; padding: 4px 8px; resize: vertical;
+  font: 12px/1.4 ui-monospace, monospace; }
+:focus-visible { outline: 2px solid var(--accent); outline-offset: 2px; }
+.picture:focus-visible, .histogram input:focus-visible { outline-offset: -2px; }
+dl { display: grid; grid-template-columns: auto 1fr; gap: 2px 10px; margin: 4px 0; }
+dt { color: var(--soft); }
+dd { margin: 0; text-align: right; overflow-wrap: anywhere; font-variant-numeric: tabular-nums; }
+details { margin-top: 14px; color: var(--soft); font-size: 12px; }
+summary { cursor: pointer; }
+.said { position: absolute; width: 1px; height: 1px; overflow: hidden; clip-path: inset(50%);
+  margin: 0; }
+.closed .panel { display: none; }
+@container (max-width: 640px) {
+  .frame { overflow: auto; grid: minmax(220px, 1fr) auto auto / minmax(0, 1fr);
+    grid-template-areas: "stage" "iso" "panel"; }
+  .frame:not(.closed) { grid-template-rows: max(220px, 55cqh) auto auto; }
+  .iso { gap: 10px; padding: 8px 10px; }
+  .iso .number { width: 84px; }
+  .panel { width: auto; border: 0; border-top: 1px solid var(--line); overflow: visible; }
+}
+@media (pointer: coarse) { button, input[type=number], select { height: 36px; }
+  .panel label { min-height: 40px; } }
+@media (prefers-reduced-motion: reduce) { * { transition: none !important; } }
+`;

@@ -1,0 +1,159 @@
+// state.js -- what a view shows, as a URL keeps it: the camera and how it moves, isovalue, colours.
+// The first part of an ES module (front_end.py).
+
+/** @typedef {[number, number, number]} Vec */
+/** @typedef {{eye: Vec, at: Vec, up: Vec, fovy_deg: number}} Camera world space */
+/** @typedef {{isovalue: number, camera: ?Camera, color: string, background: ?string,
+ *    samples: number, max_error: ?number, time_budget: ?number, ambient: number}} State
+ *    what the URL keeps */
+
+const AMBIENT = [8, 16, 32, 64]; // rays of a hit that one can choose
+
+// Vectors.
+const add = (a, b) => a.map((x, i) => x + b[i]);
+const sub = (a, b) => a.map((x, i) => x - b[i]);
+const scale = (a, s) => a.map((x) => x * s);
+const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+const cross = (a, b) => [
+  a[1] * b[2] - a[2] * b[1],
+  a[2] * b[0] - a[0] * b[2],
+  a[0] * b[1] - a[1] * b[0],
+];
+const length = (a) => Math.hypot(...a);
+const unit = (a) => scale(a, 1 / length(a));
+const clamp = (x, low, high) => Math.min(high, Math.max(low, x));
+
+/** v turned about a unit axis [radians] (Rodrigues). */
+function turn(v, axis, angle) {
+  const c = Math.cos(angle);
+  const along = scale(axis, dot(axis, v) * (1 - c));
+  return add(add(scale(v, c), scale(cross(axis, v), Math.sin(angle))), along);
+}
+
+/** The eye goes around `at`: yaw to the left of up, pitch towards up [radians]. */
+export function orbit(camera, yaw, pitch) {
+  const up = unit(camera.up);
+  const away = turn(sub(camera.eye, camera.at), up, -yaw);
+  const polar = Math.acos(clamp(dot(unit(away), up), -1, 1));
+  const next = clamp(polar - pitch, 0.02, Math.PI - 0.02);
+  const eye = add(camera.at, turn(away, unit(cross(up, away)), next - polar));
+  return { ...camera, eye };
+}
+
+/** Eye and at move so that the surface follows by dx, dy [picture heights; y down]. */
+export function pan(camera, dx, dy) {
+  const forward = sub(camera.at, camera.eye);
+  const height = 2 * length(forward) * Math.tan((camera.fovy_deg * Math.PI) / 360);
+  const right = unit(cross(forward, camera.up));
+  const up = cross(right, unit(forward));
+  const move = add(scale(right, -dx * height), scale(up, dy * height));
+  return { ...camera, eye: add(camera.eye, move), at: add(camera.at, move) };
+}
+
+/** The eye's distance from `at` is multiplied by a factor. */
+export function zoom(camera, factor) {
+  const away = scale(sub(camera.eye, camera.at), factor);
+  return length(away) > 0 ? { ...camera, eye: add(camera.at, away) } : camera;
+}
+
+/** Throws  Error that says what is wrong with a camera */
+function checkCamera(camera) {
+  for (const key of ["eye", "at", "up"]) {
+    const v = camera[key];
+    if (!Array.isArray(v) || v.length !== 3 || !v.every(Number.isFinite)) {
+      throw new Error(`"${key}" must be three numbers, such as [0, 1, 0].`);
+    }
+    if (v.some((x) => Math.abs(x) > 1e18)) throw new Error(`"${key}" is too large.`);
+  }
+  if (!(camera.fovy_deg >= 0.001 && camera.fovy_deg <= 179.999)) {
+    throw new Error('"fovy_deg" must be an angle between 0 and 180 degrees.');
+  }
+  const forward = sub(camera.at, camera.eye);
+  if (!(length(forward) > 1e-12 * Math.max(...[...camera.at, ...camera.eye].map(Math.abs)))) {
+    throw new Error('"eye" and "at" are the same point.');
+  }
+  const cosine = length(camera.up) > 0 ? dot(unit(forward), unit(camera.up)) : 1;
+  if (Math.abs(cosine) > 1 - 1e-12) throw new Error('"up" is parallel to the view, or zero.');
+  const { eye, at, up, fovy_deg } = camera;
+  return { eye, at, up, fovy_deg };
+}
+
+/**
+ * The first camera of a camera file.
+ * @param {string} text JSON: {"fovy_deg": F, "cameras": [{"eye", "at", "up"}]}
+ * @returns {Camera}
+ * @throws {Error} that says what is wrong with it
+ */
+export function readCamera(text) {
+  let file;
+  try {
+    file = JSON.parse(text);
+  } catch {
+    throw new Error('This is no camera: it must be JSON with "fovy_deg" and "cameras".');
+  }
+  const first = file?.cameras?.[0];
+  if (typeof first !== "object" || first === null) {
+    throw new Error('This is no camera: "cameras" with "eye", "at" and "up" is missing.');
+  }
+  if (first.parallel_height !== undefined) {
+    throw new Error('This page draws in perspective alone: leave out "parallel_height".');
+  }
+  return checkCamera({ up: [0, 1, 0], ...first, fovy_deg: file.fovy_deg ?? 60 });
+}
+
+/** A camera file of one camera. */
+export function writeCamera(camera, width, height) {
+  const { eye, at, up, fovy_deg } = camera;
+  return JSON.stringify({ width, height, fovy_deg, cameras: [{ eye, at, up }] });
+}
+
+/** The state as a URL's hash; what is not set is left out. */
+export function writeHash(state) {
+  const short = (v) => String(Number(v.toPrecision(9)));
+  const { camera } = state;
+  const parts = { iso: short(state.isovalue), color: state.color.slice(1) };
+  if (state.background) parts.background = state.background.slice(1);
+  if (state.samples > 1) parts.samples = state.samples;
+  if (state.max_error) parts.error = short(state.max_error);
+  if (state.time_budget) parts.ms = short(state.time_budget);
+  if (state.ambient) parts.ambient = state.ambient;
+  if (camera) {
+    for (const key of ["eye", "at", "up"]) parts[key] = camera[key].map(short).join(",");
+    parts.fovy = short(camera.fovy_deg);
+  }
+  return "#" + Object.entries(parts).map(([k, v]) => `${k}=${v}`).join("&");
+}
+
+/**
+ * What a URL's hash says; parts that are not understood are left out.
+ * @param {string} hash
+ * @returns {Partial<State>}
+ */
+export function readHash(hash) {
+  const parts = new URLSearchParams(hash.replace(/^#/, ""));
+  const number = (key, low, high) => {
+    const value = parts.get(key) ? Number(parts.get(key)) : NaN;
+    return value >= low && value <= high ? value : undefined;
+  };
+  const color = (key) =>
+    /^[0-9a-f]{6}$/i.test(parts.get(key) ?? "") ? `#${parts.get(key)}` : undefined;
+  const vector = (key) => (parts.get(key) ?? "").split(",").map(Number);
+  const state = {
+    isovalue: number("iso", -3.4e38, 3.4e38),
+    color: color("color"),
+    background: color("background"),
+    samples: [1, 2, 3, 4].find((n) => n === number("samples", 1, 4)),
+    max_error: number("error", 0.001, 1000),
+    time_budget: parts.has("error") ? undefined : number("ms", 1, 10000),
+    ambient: [0, ...AMBIENT].find((n) => n === number("ambient", 0, 255)),
+  };
+  if (parts.has("eye")) {
+    try {
+      const [eye, at, up] = ["eye", "at", "up"].map(vector);
+      state.camera = checkCamera({ eye, at, up, fovy_deg: number("fovy", 0.001, 179.999) });
+    } catch {
+      // A camera that cannot be used: the view stays as it is.
+    }
+  }
+  return Object.fromEntries(Object.entries(state).filter(([, v]) => v !== undefined));
+}

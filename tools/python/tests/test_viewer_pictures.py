@@ -1,0 +1,51 @@
+"""Sizes of pictures, their encoding, and the first isovalue."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from isowave.viewer.pictures import Extent, Stopped, count_rays, dividing_value, encode_png
+from isowave.viewer.pictures import fit_size, share_within
+
+
+def test_an_encoding_stops_when_its_picture_is_not_wanted_any_more() -> None:
+    rgb = np.random.default_rng(3).integers(0, 256, (400, 400, 3), np.uint8)
+    assert encode_png(rgb, lambda: True).startswith(b"\x89PNG")
+    asked = iter([True, True, False])
+    with pytest.raises(Stopped):
+        encode_png(rgb, lambda: next(asked))
+
+
+def test_an_extent_shrinks_by_its_pixels_first() -> None:
+    extent = Extent((100, 50), 2, 9)
+    assert (extent.rays, extent.all_rays) == (20_000, 200_000)
+    assert extent.within(20_000, 200_000) == extent
+    assert extent.within(5_000, 200_000) == Extent((50, 25), 2, 9)
+    assert extent.within(20_000, 100_000) == Extent((100, 50), 2, 4)
+    assert extent.within(20_000, 5_000) == Extent((50, 25), 2, 0)
+
+
+@pytest.mark.parametrize("rays", [1, 2, 7, 100, 12345])
+@pytest.mark.parametrize("size", [(1, 1), (8192, 1), (1, 8192), (1280, 720), (33, 77)])
+@pytest.mark.parametrize("samples", [1, 3])
+def test_sizes_fit(size: tuple[int, int], samples: int, rays: int) -> None:
+    fitted = fit_size(size, samples, rays)
+    assert min(fitted) >= 1 and fitted[0] <= size[0] and fitted[1] <= size[1]
+    assert count_rays(fitted, samples) <= max(rays, samples**2)
+
+
+def test_the_share_of_rays_within_a_bound() -> None:
+    inf = np.inf
+    depth = np.array([inf, inf, 5, 5, 5], np.float32)
+    bounds = np.array([0, inf, 0.5, 0.25, inf], np.float32)
+    assert share_within(depth, bounds, 0.25) == 0.25
+    assert share_within(depth, bounds, 1) == 0.5
+    assert share_within(depth[:1], bounds[:1], 1) is None
+
+
+def test_the_dividing_value_is_between_two_peaks() -> None:
+    counts = [0, 9, 10, 9, 0, 0, 0, 0, 4, 5, 4, 0]
+    assert 4.0 <= dividing_value(counts, 0.0, 12.0) <= 8.0
+    assert dividing_value([0, 0], 1.0, 3.0) == 2.0
+    assert dividing_value([5], 1.0, 3.0) == 2.0

@@ -1,0 +1,319 @@
+"""Renderers of a scene: budgets, memory, and limits, step by step."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+import pytest
+from viewer_fakes import FakeVolume
+from viewer_scenes import Clock, Eye, make_scene, run, wish_of
+
+from isowave.viewer.protocol import Ack, Budget
+from isowave.viewer.renderers import GIVE_BACK_SECONDS, MAX_CAMERA_RAYS
+from isowave.viewer.scene import Scene
+
+
+def test_a_new_budget_makes_a_new_renderer_for_all() -> None:
+    clock, volume = Clock(), FakeVolume()
+    scene = make_scene(volume, clock)
+    eyes = [Eye(scene), Eye(scene)]
+    scene.receive(eyes[0].client, Budget(1 << 29))
+    run(scene)
+    assert [r["memory_budget"] for r in volume.renderers] == [None, 1 << 29]
+    for eye in eyes:
+        states = [(h["state"], h["memory_budget"]) for h in eye.of_type("status")]
+        assert states == [("ready", None), ("starting", 1 << 29), ("ready", 1 << 29)]
+
+
+def test_budgets_that_change_too_often_do_not_keep_others_from_their_pictures() -> None:
+    clock, volume = Clock(), FakeVolume()
+    scene = make_scene(volume, clock)
+    eye, other = Eye(scene), Eye(scene)
+    for i in range(100):
+        scene.receive(eye.client, Budget((1 << 29) + i))
+        scene.step()
+    other.wish()
+    run(scene)
+    assert other.pictures == [(1, "first"), (1, "whole")] and not other.of_type("error")
+    assert len(volume.renderers) == 1 + 5
+    assert "changed too often" in eye.of_type("error")[-1]["message"]
+    clock.now += GIVE_BACK_SECONDS
+    scene.receive(eye.client, Budget(1 << 28))
+    run(scene)
+    assert volume.renderers[-1]["memory_budget"] == 1 << 28
+
+
+def test_a_budget_that_is_too_small_leaves_the_old_one() -> None:
+    def refuse(options: dict[str, Any]) -> Exception | None:
+        too_small = options["memory_budget"] is not None and options["memory_budget"] < 1000
+        return RuntimeError("needs 1000 bytes") if too_small else None
+
+    clock, volume = Clock(), FakeVolume(refuse=refuse)
+    scene = make_scene(volume, clock)
+    eye = Eye(scene)
+    scene.receive(eye.client, Budget(10))
+    eye.wish()
+    run(scene)
+    assert [h["message"] for h in eye.of_type("error")] == ["needs 1000 bytes"]
+    assert eye.of_type("status")[-1]["state"] == "ready"
+    assert eye.of_type("status")[-1]["memory_budget"] is None
+    assert eye.of_type("status")[-1]["notice"] == ""
+    assert eye.pictures == [(1, "first"), (1, "whole")]
+
+
+@pytest.mark.parametrize("works", [True, False])
+def test_the_host_draws_while_the_device_is_prepared(works: bool) -> None:
+    may_begin, changed, heads = threading.Event(), threading.Condition(), list[dict[str, Any]]()
+
+    def refuse(options: dict[str, Any]) -> Exception | None:
+        assert may_begin.wait(60)
+        return None if works else RuntimeError("no device")
+
+    def post(head: dict[str, Any], data: bytes | None) -> None:
+        with changed:
+            heads.append(head)
+            changed.notify_all()
+        if data is not None and client is not None:
+            scene.receive(client, Ack(head["frame"]))
+
+    def came(**wanted: Any) -> bool:
+        def there() -> bool:
+            return any(all(h.get(k) == v for k, v in wanted.items()) for h in heads)
+
+        with changed:
+            return changed.wait_for(there, 60)
+
+    volume = FakeVolume(refuse=refuse)
+    host = FakeVolume().renderer(device="host", size=(64, 48), samples=1)
+    scene = Scene(volume, isovalue=80, size=(64, 48), make_host=lambda v: host)
+    client = scene.join(post)
+    assert client is not None
+    scene.receive(client, wish_of(1))
+    assert came(stage="lossless", wish=1)
+    assert not [h for h in heads if h.get("state") in ("ready", "failed")] and not volume.frames
+    may_begin.set()
+    if works:
+        # The pictures have the same bits: only what the host does not know is drawn again.
+        assert came(type="bounds", wish=1)
+        assert [f.request.outputs for f in volume.frames] == [("depth", "bounds")]
+    else:
+        assert came(type="error", message="no device")
+        scene.receive(client, wish_of(2))
+        assert came(type="error", message="no device", wish=2)
+    scene.close()
+
+
+def test_without_any_device_each_wish_says_why_until_a_budget_works() -> None:
+    working = False
+
+    def refuse(options: dict[str, Any]) -> Exception | None:
+        return None if working else RuntimeError("no OpenCL device: pip install isowave[cpu]")
+
+    clock, volume = Clock(), FakeVolume(refuse=refuse)
+    scene = make_scene(volume, clock)
+    eye = Eye(scene)
+    eye.wish()
+    run(scene)
+    assert eye.of_type("status")[-1]["state"] == "failed"
+    assert eye.of_type("error")[-1] == {
+        "type": "error",
+        "wish": 1,
+        "message": "no OpenCL device: pip install isowave[cpu]",
+    }
+    working = True
+    scene.receive(eye.client, Budget(None))
+    eye.wish()
+    run(scene)
+    assert eye.pictures[-1] == (2, "whole")
+
+
+def test_a_renderer_grows_with_the_pictures() -> None:
+    clock, volume = Clock(), FakeVolume()
+    scene = make_scene(volume, clock, size=(64, 48))
+    eye = Eye(scene)
+    eye.wish(size=(64, 48), samples=2)
+    run(scene)
+    assert [(r["size"], r["samples"]) for r in volume.renderers] == [((64, 48), 1), ((64, 48), 2)]
+    assert (volume.frames[-1].size, volume.frames[-1].request.samples) == ((64, 48), 2)
+
+
+def test_a_renderer_that_cannot_grow_draws_smaller_pictures() -> None:
+    def refuse(options: dict[str, Any]) -> Exception | None:
+        return RuntimeError("too large") if options["samples"] > 1 else None
+
+    clock, volume = Clock(), FakeVolume(refuse=refuse)
+    scene = make_scene(volume, clock, size=(64, 48))
+    eye = Eye(scene)
+    eye.wish(size=(64, 48), samples=2)
+    run(scene)
+    eye.ack()
+    eye.wish(size=(64, 48), samples=2)
+    run(scene)
+    assert len(volume.renderers) == 3  # the first, the one too large, the first again
+    assert (volume.frames[-1].size, volume.frames[-1].request.samples) == ((32, 24), 2)
+    assert eye.of_type("picture")[-1]["reduced"] == (
+        "The device has no memory for more: this picture has 32 x 24 pixels, 4 rays a pixel, "
+        "0 ambient rays."
+    )
+
+
+def test_finished_pictures_say_if_the_isovalue_is_outside_the_values() -> None:
+    scene = make_scene(FakeVolume(), Clock(), size=(64, 48))
+    eye = Eye(scene)
+    for isovalue, notice in ((300.0, "isovalue 300 is outside."), (100.0, "")):
+        eye.wish(size=(64, 48), isovalue=isovalue)
+        run(scene)
+        eye.ack()
+        assert eye.of_type("picture")[-1]["stage"] in ("whole", "lossless")
+        assert eye.of_type("picture")[-1]["notice"] == notice
+
+
+def test_whole_pictures_have_ambient_rays_and_a_renderer_for_them() -> None:
+    clock, volume = Clock(), FakeVolume()
+    scene = make_scene(volume, clock, size=(64, 48))
+    eye = Eye(scene)
+    eye.wish(size=(64, 48), ambient=16)
+    run(scene)
+    assert [r["rays"] for r in volume.renderers] == [False, True]
+    drawn = [(frame.size, frame.request.ambient) for frame in volume.frames]
+    assert drawn == [((16, 12), 0), ((64, 48), 16)], "none in the first picture"
+    eye.ack()
+    eye.wish(81.0, size=(64, 48))
+    run(scene)
+    assert volume.frames[-1].request.ambient == 0 and len(volume.renderers) == 2
+
+
+def test_without_memory_for_ambient_rays_pictures_have_none() -> None:
+    def refuse(options: dict[str, Any]) -> Exception | None:
+        return RuntimeError("too large") if options["rays"] else None
+
+    clock, volume = Clock(), FakeVolume(refuse=refuse)
+    scene = make_scene(volume, clock, size=(64, 48))
+    eye = Eye(scene)
+    for isovalue in (80.0, 81.0):
+        eye.wish(isovalue, size=(64, 48), ambient=16)
+        run(scene)
+        eye.ack()
+        assert volume.frames[-1].request.ambient == 0
+    assert [r["rays"] for r in volume.renderers] == [False, True, False], "not tried again"
+    scene.receive(eye.client, Budget(1 << 30))
+    eye.wish(82.0, size=(64, 48), ambient=16)
+    run(scene)
+    assert volume.renderers[-2]["rays"], "tried again with another budget"
+
+
+@pytest.mark.parametrize(
+    "wish",
+    [
+        dict(size=(8192, 8192)),
+        dict(size=(8192, 8192), ambient=255),
+        dict(size=(8192, 8192), samples=8, ambient=255),
+        dict(size=(8192, 1), samples=8, ambient=255),
+        dict(size=(40, 40), ambient=255),
+    ],
+)
+def test_no_picture_has_more_rays_than_the_server_allows(wish: dict[str, Any]) -> None:
+    clock, volume = Clock(), FakeVolume()
+    limit = 20_000
+    scene = make_scene(volume, clock, size=(64, 48), max_rays=limit)
+    eye = Eye(scene)
+    eye.wish(**wish)
+    run(scene)
+    eye.ack()
+    clock.now += 0.2
+    run(scene)
+    clock.now += 1
+    run(scene)
+    assert eye.of_type("picture")[-1]["stage"] == "lossless" and not eye.of_type("error")
+    for frame in volume.frames:
+        rays = frame.size[0] * frame.size[1] * frame.request.samples**2
+        assert 0 < rays * (1 + frame.request.ambient) <= limit
+    for made in volume.renderers:
+        assert made["size"][0] * made["size"][1] * made["samples"] ** 2 <= limit
+    for head in eye.of_type("picture")[-2:]:
+        drawn = next(f for f in reversed(volume.frames) if f.request.outputs == ("rgb",))
+        assert (head["size"], head["ambient"]) == (list(drawn.size), drawn.request.ambient)
+        assert head["reduced"].startswith("The server draws at most 20,000 rays, 20,000 from")
+        assert f"{drawn.size[0]} x {drawn.size[1]} pixels" in head["reduced"]
+        assert f", {drawn.request.ambient} ambient ray" in head["reduced"]
+
+
+def test_pictures_within_the_limits_are_drawn_as_they_are() -> None:
+    clock, volume = Clock(), FakeVolume()
+    scene = make_scene(volume, clock, size=(64, 48), max_rays=64 * 48 * 4 * 17)
+    eye = Eye(scene)
+    eye.wish(samples=2, ambient=16)
+    run(scene)
+    assert (volume.frames[-1].request.samples, volume.frames[-1].request.ambient) == (2, 16)
+    assert all(head["reduced"] is None for head in eye.of_type("picture"))
+
+
+def test_camera_rays_have_a_limit_of_their_own() -> None:
+    """Each takes memory of the device. The pictures are not drawn: they would take too long."""
+    scene = make_scene(FakeVolume(), Clock())
+    eye = Eye(scene)
+    eye.wish(size=(8192, 8192), ambient=255)
+    assert eye.client.wish is not None
+    plan = scene._renderers.plan(eye.client.wish)
+    assert 0.99 * MAX_CAMERA_RAYS < plan.rays <= MAX_CAMERA_RAYS and plan.ambient == 7
+    owner = make_scene(FakeVolume(), Clock(), size=(8000, 8000))
+    assert owner._renderers.plan(eye.client.wish).rays == 64_000_000, "the server's own size counts"
+
+
+@pytest.mark.parametrize("option", ["max_rays", "max_clients"])
+def test_limits_below_1_are_refused(option: str) -> None:
+    with pytest.raises(ValueError, match=f"{option} 0: give 1 or more"):
+        Scene(FakeVolume(), start=False, **{option: 0})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("goes", ["leaves", "wants less"])
+@pytest.mark.parametrize("wish", [dict(size=(128, 96)), dict(samples=2), dict(ambient=8)])
+def test_memory_goes_back_when_it_is_not_needed_any_more(goes: str, wish: dict[str, Any]) -> None:
+    clock, volume = Clock(), FakeVolume()
+    scene = make_scene(volume, clock, size=(64, 48))
+    eye, other = Eye(scene), Eye(scene)
+    eye.wish(**wish)
+    other.wish()
+    run(scene)
+    clock.now += 100
+    run(scene)
+    assert len(volume.renderers) == 2, "a client that rests still needs it"
+    if goes == "leaves":
+        scene.leave(eye.client)
+    else:
+        eye.wish()
+    run(scene)
+    clock.now += GIVE_BACK_SECONDS - 1
+    run(scene)
+    assert len(volume.renderers) == 2, "it may be needed again"
+    clock.now += 2
+    run(scene)
+    assert len(volume.renderers) == 3 and volume.renderers[2] == volume.renderers[0]
+    clock.now += 100
+    run(scene)
+    assert len(volume.renderers) == 3
+    other.ack()
+    other.wish(90.0)
+    run(scene)
+    assert other.pictures[-1] == (2, "whole")
+
+
+def test_a_large_renderer_stays_for_those_who_still_need_it() -> None:
+    clock, volume = Clock(), FakeVolume()
+    scene = make_scene(volume, clock, size=(64, 48))
+    eyes = [Eye(scene), Eye(scene)]
+    for eye in eyes:
+        eye.wish(samples=2)
+        run(scene)
+    scene.leave(eyes[0].client)
+    clock.now += 100
+    run(scene)
+    assert len(volume.renderers) == 2
+    eyes[1].wish()
+    clock.now += 1
+    run(scene)
+    eyes[1].wish(samples=2)
+    clock.now += 100
+    run(scene)
+    assert len(volume.renderers) == 2, "it was needed again in time"
