@@ -48,7 +48,7 @@ inline Grid sphere_grid() {
       .dims = {kSphereEdge, kSphereEdge, kSphereEdge}, .spacing = {1, 2, 1}, .origin = {5, 6, 7}};
 }
 
-std::shared_ptr<const Volume> sphere(const Compression &compression = {.rate = 16}) {
+inline std::shared_ptr<const Volume> sphere(const Compression &compression = {.rate = 16}) {
   return compress(sphere_voxels(), sphere_grid(), compression);
 }
 inline std::shared_ptr<const Volume> public_volume() {
