@@ -55,7 +55,7 @@ class SoonRenderer : public RendererAround {
 
   Abilities abilities() const override { return parts_.abilities; }
   const Abilities &meanwhile_abilities() const { return parts_.meanwhile_abilities; }
-  Team &team() override { return Renderer::team(); }
+  Team &team() override { return alone_; }
   /// Waits until ready().
   std::vector<VolumeInfo> levels() const override;
   FrameStats render(const FrameRequest &request) override;
@@ -75,6 +75,7 @@ class SoonRenderer : public RendererAround {
   Renderer &find_any();
   Renderer &inner() const override;
 
+  TeamOfOne alone_;  ///< also before there is a renderer
   SoonParts parts_;
   std::unique_ptr<Renderer> meanwhile_;
   bool has_meanwhile_ = true;     ///< false: it could not be made
