@@ -25,8 +25,9 @@ std::vector<double> all_voxel_pixels() {
   return errors;
 }
 
-/// Errors of voxels that may be chosen: an eighth of the range of values, and so many times half of
-/// it, as long as they matter beside the volume's own error, and leave out bit planes.
+/// Number of errors of voxels that may be chosen. The largest is an eighth of the range of values,
+/// and each further one is half of the one before. Errors that are small beside the volume's own,
+/// or that leave out no bit planes, are dropped.
 constexpr int kNumValueErrors = 8;
 std::vector<double> voxel_errors(const CompressedVolume &volume, double error) {
   const double range = double{volume.value_range[1]} - double{volume.value_range[0]};

@@ -32,10 +32,10 @@ RendererOptions with_choices(RendererOptions options, const CompressedVolume &vo
 /// request            the frame's request; its voxel_pixels and voxel_error do not matter
 /// max_surface_error  error that most pixels are to keep [pixels], above 0
 ///
-/// Draws small pictures of the frame, every so many pixels, and their bounds (certify()). So the
-/// choice depends on data, camera and size, never on timings. Picks the coarsest levels of detail,
-/// then the fewest bit planes, that cost at most kLostShare of the certified pixels. Levels are
-/// skipped if they save too few blocks (kMaxBlocksShare); bit planes are kept for volumes below
+/// Draws small pictures of the frame, with a part of its pixels, and their bounds (certify()). So
+/// the choice depends on data, camera and size, never on timings. Picks the coarsest levels of
+/// detail, then the fewest bit planes, that cost at most kLostShare of the certified pixels. Levels
+/// are skipped if they save too few blocks (kMaxBlocksShare); bit planes are kept for volumes below
 /// kMinPlaneRate bits a voxel. Full detail if most pixels do not keep max_surface_error even so.
 /// All ranks of a team choose what rank 0 finds. Throws Error as certify() does.
 DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, double rate,

@@ -30,8 +30,8 @@ BlockBox kept_blocks(const glm::ivec3 &blocks, const BlockBox &own);
 /// own    not empty, within the whole
 VolumeInfo brick_info(const VolumeInfo &whole, const BlockBox &own);
 
-/// Blocks along an edge of the cubes that cuts may not part (Cuts) if so many levels of detail are
-/// drawn. A brick is then the same box at all levels, and rays change level within a brick.
+/// Edge of the cubes that cuts keep whole (Cuts), if num_levels levels of detail are drawn
+/// [blocks]. A brick is then the same box at all levels, and rays change level within a brick.
 inline int cut_unit(std::size_t num_levels) {
   return 1 << (num_levels - 1);
 }
@@ -62,7 +62,7 @@ CompressedVolume compress_brick(const OpenReader &open, std::string_view what,
 ///         volume can be drawn
 std::vector<VolumeInfo> read_levels(const std::string &path, const RawOverrides &overrides);
 
-/// A brick of a volume of any kind, with so many levels of detail: read, or compressed.
+/// Reads or compresses a brick of a volume of any kind, with its levels of detail.
 ///
 /// info    the finest level's, from read_levels()
 /// storage its device also makes generated voxels; with measure_error, bounds of a file's blocks

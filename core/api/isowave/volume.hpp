@@ -185,7 +185,7 @@ std::shared_ptr<const Volume> compress_to_file(const ReadLayers &read, VoxelType
                                                const Compression &compression = {},
                                                bool keep = true);
 
-/// Throws  Error unless the grid has so many voxels
+/// Throws  Error unless num_voxels is the grid's number of voxels
 void check_num_voxels(std::uint64_t num_voxels, const Grid &grid);
 
 /// The type of voxels T.
