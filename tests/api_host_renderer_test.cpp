@@ -29,7 +29,6 @@ TEST(ApiHostRenderer, RefusesInOneLineWhatDevicesAloneCan) {
     EXPECT_FALSE(renderer.can_draw(bad)) << text;
     EXPECT_EQ(renderer.render(good).picture, picture) << text;
   };
-  expect_error("leave out voxel_pixels", [](FrameRequest &r) { r.voxel_pixels = 1; });
   expect_error("leave out voxel_error", [](FrameRequest &r) { r.voxel_error = 1; });
   expect_error("leave out bound", [](FrameRequest &r) { r.bound = FieldBound::kLower; });
   expect_error("leave out max_surface_error", [](FrameRequest &r) { r.max_surface_error = 1; });

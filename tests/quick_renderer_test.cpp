@@ -86,21 +86,25 @@ TEST_P(QuickRendererOnDevice, AFrameAtWorkIsBegunAnewByTheDevice) {
 }
 
 TEST_P(QuickRendererOnDevice, WhatTheHostCannotDrawWaits) {
-  FrameRequest levels = request(), bounds = request();
-  levels.voxel_pixels = 2;
+  FrameRequest levels = request(), planes = request(), bounds = request();
+  levels.voxel_pixels = planes.voxel_pixels = 2;
+  planes.voxel_error = 4;
   bounds.want_bounds = true;
-  const std::vector<float> expected =
-      Renderer(device_, volume_, {.largest = kSize, .with_levels = true}).render(levels).depth;
+  Renderer on_device(device_, volume_, {.largest = kSize, .with_levels = true});
+  const std::vector<float> expected = on_device.render(planes).depth,
+                           all_planes = on_device.render(levels).depth;
   std::unique_lock busy = busy_device();
   Renderer renderer = make();
   EXPECT_TRUE(renderer.ready_for(request()));
   EXPECT_FALSE(renderer.ready_for(bounds));
-  EXPECT_FALSE(renderer.ready_for(levels));
+  EXPECT_FALSE(renderer.ready_for(planes));
+  EXPECT_TRUE(renderer.ready_for(levels));
+  EXPECT_EQ(renderer.render(levels).depth, all_planes);
   const auto what_it_can = [&] {
-    return std::array{renderer.can_draw(levels), renderer.can_draw(bounds)};
+    return std::array{renderer.can_draw(planes), renderer.can_draw(bounds)};
   };
   EXPECT_EQ(what_it_can(), (std::array{true, false})) << "before it is ready";
-  auto frame = std::async(std::launch::async, [&] { return renderer.render(levels); });
+  auto frame = std::async(std::launch::async, [&] { return renderer.render(planes); });
   busy.unlock();
   EXPECT_EQ(frame.get().depth, expected);
   EXPECT_EQ(what_it_can(), (std::array{true, false}));

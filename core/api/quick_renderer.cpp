@@ -48,7 +48,7 @@ Renderer make_quick_renderer(std::shared_ptr<Device> device, std::shared_ptr<con
         .make = [&to = *device, &of = *volume,
                  options](const std::stop_token &stop) { return make_soon(to, of, options, stop); },
         .before_use = [&on, &turn = *turns] { turn.take(on.mutex); },
-        .meanwhile_abilities = core::HostRenderer::all_abilities(),
+        .meanwhile_abilities = core::HostRenderer::abilities_of(compressed),
         .make_meanwhile =
             [&compressed, host_options] {
               return std::make_unique<core::HostRenderer>(

@@ -79,14 +79,23 @@ std::uint64_t HostBlocks::bytes(const VolumeInfo &info) {
          num_pages(num_blocks * sizeof(ulong)) + kNumThresholds * sizeof(float);
 }
 
-std::uint64_t HostBlocks::least_bytes(const VolumeInfo &info) {
-  return bytes(info) + kLeastPages * platform::page_bytes();
+std::uint64_t HostBlocks::ray_bytes() {
+  return kLeastPages * platform::page_bytes();
 }
 
 HostBlocks::HostBlocks(const CompressedVolume &volume, std::uint64_t memory_limit,
                        std::uint32_t num_threads)
+    : HostBlocks(volume, std::make_unique<HostRoom>(memory_limit, num_threads), num_threads) {}
+
+HostBlocks::HostBlocks(const CompressedVolume &volume, std::unique_ptr<HostRoom> room,
+                       std::uint32_t num_threads)
+    : HostBlocks(volume, *room, num_threads) {
+  own_room_ = std::move(room);
+}
+
+HostBlocks::HostBlocks(const CompressedVolume &volume, HostRoom &room, std::uint32_t num_threads)
     : volume_(&volume),
-      memory_limit_(memory_limit),
+      room_(&room),
       num_threads_(num_threads),
       blocks_(volume.num_blocks()),
       macrocells_((blocks_ + kEdge - 1u) / kEdge),
@@ -95,9 +104,10 @@ HostBlocks::HostBlocks(const CompressedVolume &volume, std::uint64_t memory_limi
       changing_(volume.block_count() * sizeof(ulong)),
       decoded_(volume.block_count()),
       opened_(volume.block_count()),
-      num_bytes_(bytes(volume.info)),
       selection_(kFirstSelection) {
   find_ranges();
+  room.hold(bytes(volume.info));
+  room.add([this] { drop(); });
 }
 
 /// As far as decode() needs it, in host memory.
@@ -286,49 +296,15 @@ std::optional<BlockBox> HostBlocks::rounded_box(float isovalue) const {
 // parallel_for() has joined.
 
 HostField HostBlocks::field() {
-  return {values(), changing(), masks_.data(), decoded_.data(), opened_.data(), selection_, this};
-}
-
-void HostBlocks::run(std::uint64_t num_items,
-                     const std::function<void(std::uint64_t item, bool is_alone)> &work) {
-  std::vector<uchar> is_done(num_items);
-  for (;;) {
-    std::atomic<bool> any_done = false;
-    try {
-      parallel_for(num_items, num_threads_, [&](std::uint64_t item, std::uint32_t) {
-        if (is_done[item] != 0) return;
-        work(item, false);
-        is_done[item] = 1;
-        any_done.store(true, std::memory_order_relaxed);
-      });
-      return;
-    } catch (const NoRoom &) {
-      drop();
-    }
-    if (any_done) continue;
-    const auto next = std::ranges::find(is_done, 0);
-    is_alone_ = true;
-    try {
-      work(static_cast<std::uint64_t>(next - is_done.begin()), true);
-    } catch (...) {
-      is_alone_ = false;
-      throw;
-    }
-    is_alone_ = false;
-    *next = 1;
-  }
-}
-
-/// Does what needs some blocks at a time. A thread alone makes room for them.
-template <class Work>
-void HostBlocks::with_room(Work work) {
-  if (!is_alone_) return work();
-  try {
-    work();
-  } catch (const NoRoom &) {
-    drop();
-    work();
-  }
+  return {.values = values(),
+          .changing = changing(),
+          .masks = masks_.data(),
+          .highs = ranges_.high.data(),
+          .has_gaps = !volume_->no_data.empty(),
+          .decoded = decoded_.data(),
+          .opened = opened_.data(),
+          .selection = selection_,
+          .maker = this};
 }
 
 void HostBlocks::open(std::size_t block) {
@@ -337,7 +313,7 @@ void HostBlocks::open(std::size_t block) {
   // Beyond the volume, any voxels do: they matter to cells outside it alone.
   for (uint corner = 0; corner < 8; ++corner)
     dual_grid[corner] = block_at(glm::min(place + corner_of(corner), blocks_ - 1u));
-  with_room([&] {
+  room_->with_room([&] {
     for (const std::size_t id : dual_grid) decode_once(id);
     take_page(changing_, block * sizeof(ulong));
     find_changing(block, dual_grid);
@@ -345,7 +321,7 @@ void HostBlocks::open(std::size_t block) {
 }
 
 void HostBlocks::decode(std::span<const std::size_t> blocks) {
-  with_room([&] {
+  room_->with_room([&] {
     for (const std::size_t id : blocks) decode_once(id);
   });
 }
@@ -418,12 +394,8 @@ void HostBlocks::take_page(Pages &pages, std::uint64_t byte) {
   const std::uint64_t page_bytes = platform::page_bytes();
   std::atomic<uchar> &taken = pages.taken[byte / page_bytes];
   if (taken.load(std::memory_order_relaxed) != 0) return;
-  if (num_bytes_.fetch_add(page_bytes, std::memory_order_relaxed) + page_bytes > memory_limit_) {
-    num_bytes_.fetch_sub(page_bytes, std::memory_order_relaxed);
-    throw NoRoom();
-  }
-  if (taken.exchange(1, std::memory_order_relaxed) != 0)
-    num_bytes_.fetch_sub(page_bytes, std::memory_order_relaxed);
+  room_->take(page_bytes);
+  if (taken.exchange(1, std::memory_order_relaxed) != 0) room_->give_back(page_bytes);
 }
 
 bool HostBlocks::is_decoded(std::size_t block) const {
@@ -438,11 +410,15 @@ void HostBlocks::forget() {
 /// Forgets what is decoded, and gives its memory back.
 void HostBlocks::drop() {
   forget();
-  for (Pages *pages : {&values_, &changing_}) {
-    pages->memory.release();
-    fill(pages->taken, 0);
-  }
-  num_bytes_ = bytes(volume_->info);
+  for (Pages *pages : {&values_, &changing_}) release(*pages);
+}
+
+void HostBlocks::release(Pages &pages) {
+  const auto num_taken = std::ranges::count_if(
+      pages.taken, [](const std::atomic<uchar> &taken) { return taken.load() != 0; });
+  pages.memory.release();
+  fill(pages.taken, 0);
+  room_->give_back(static_cast<std::uint64_t>(num_taken) * platform::page_bytes());
 }
 
 }  // namespace isowave::core
