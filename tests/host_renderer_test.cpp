@@ -386,8 +386,9 @@ TEST(HostRenderer, RequestsThatFailAreOneLine) {
   expect_error("0 x 17", [](FrameRequest &r) { r.size = {0, 17}; });
   expect_error("rays a pixel", [](FrameRequest &r) { r.size = {23, 17, 9}; });
   expect_error("leave out voxel_pixels", [](FrameRequest &r) { r.voxel_pixels = 1; });
-  expect_error("leave out voxel_error", [](FrameRequest &r) { r.voxel_error = 0.5; });
-  expect_error("leave out bound", [](FrameRequest &r) { r.bound = FieldBound::kUpper; });
+  expect_error("error is not known", [](FrameRequest &r) { r.bound = FieldBound::kUpper; });
+  expect_error("leave out max_surface", [](FrameRequest &r) { r.max_surface_error = 1; });
+  expect_error("leave out time_budget", [](FrameRequest &r) { r.time_budget_ms = 1; });
   const float nan = NAN;
   EXPECT_THAT(error_of([&] { renderer.camera({&nan, 1}, kOdd); }), HasSubstr("NaN"));
 }

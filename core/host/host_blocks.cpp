@@ -10,6 +10,7 @@
 #include "core/platform/memory.hpp"
 #include "core/view/frame.hpp"
 #include "core/volume/range_thresholds.hpp"
+#include "kernels_cl/portable/block_bound.h"
 #include "kernels_cl/portable/block_cells.h"
 
 namespace isowave::core {
@@ -68,6 +69,20 @@ std::uint64_t num_pages(std::uint64_t num_bytes) {
 
 }  // namespace
 
+HostValues::HostValues(const CompressedVolume &level, bool is_finest, double voxel_error,
+                       FieldBound bound, const std::array<float, 2> &value_range)
+    : HostValues(level) {
+  const BlockPrecision planes = with_fewer_planes(level.precision, voxel_error);
+  min_exponent = planes.min_exponent;
+  whole_numbers = planes.whole_numbers;
+  plane_error = isowave::core::plane_error(level.precision, voxel_error);
+  if (bound == FieldBound::kNone) return;
+  const ValueOffset offset =
+      value_offset(LevelError(level, is_finest), bound, plane_error, value_range);
+  uniform = offset.uniform;
+  unit = offset.unit;
+}
+
 HostBlocks::Pages::Pages(std::uint64_t num_bytes)
     : memory(num_bytes), taken(num_pages(num_bytes)) {}
 
@@ -104,6 +119,7 @@ HostBlocks::HostBlocks(const CompressedVolume &volume, HostRoom &room, std::uint
       changing_(volume.block_count() * sizeof(ulong)),
       decoded_(volume.block_count()),
       opened_(volume.block_count()),
+      decoded_as_(volume),
       selection_(kFirstSelection) {
   find_ranges();
   room.hold(bytes(volume.info));
@@ -238,8 +254,64 @@ std::optional<BlockBox> HostBlocks::box_of(Holds holds) const {
   return box;
 }
 
+void HostBlocks::decode_as(const HostValues &values) {
+  if (decoded_as_ == values) return;
+  decoded_as_ = values;
+  selected_.reset();
+  forget();
+}
+
+/// May cells whose values of all planes are from low to high have values on both sides, as blocks
+/// are decoded now? Rounding keeps the order of values: sums of a larger value and a larger offset
+/// are no smaller.
+///
+/// bound_code  the largest of the cells' blocks (BlockBounds)
+bool HostBlocks::may_hold(float low, float high, std::uint32_t bound_code, float isovalue) const {
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  const float offset = decoded_as_.uniform + decoded_as_.unit * block_bound(bound_code);
+  if (decoded_as_.plane_error != 0) {
+    low = std::nextafter(static_cast<float>(double{low} - decoded_as_.plane_error), -kInfinity);
+    high = std::nextafter(static_cast<float>(double{high} + decoded_as_.plane_error), kInfinity);
+  }
+  return !(low + std::min(offset, 0.0f) - isovalue >= 0.0f) &&
+         high + std::max(offset, 0.0f) - isovalue >= 0.0f;
+}
+
+/// The largest code of a block and those neighbours whose voxels its dual cells have.
+std::uint32_t HostBlocks::dual_grid_code(const glm::uvec3 &block) const {
+  std::uint32_t code = 0;
+  for (uint corner = 0; corner < 8; ++corner) {
+    const glm::uvec3 at = glm::min(block + corner_of(corner), blocks_ - 1u);
+    code = std::max<std::uint32_t>(code, volume_->bounds.codes[block_at(at)]);
+  }
+  return code;
+}
+
+/// The bits of a macrocell's blocks that may hold the isovalue.
+ulong HostBlocks::blocks_that_hold(std::size_t macrocell, float isovalue) const {
+  const bool has_codes = decoded_as_.unit != 0;
+  const std::uint32_t widest = has_codes ? ISO_BOUND_CODES - 1 : 0;
+  const float *low = ranges_.low.data() + 64 * macrocell,
+              *high = ranges_.high.data() + 64 * macrocell;
+  if (!may_hold(macrocell_ranges_.low[macrocell], macrocell_ranges_.high[macrocell], widest,
+                isovalue))
+    return 0;
+  if (decoded_as_.plane_error == 0 && decoded_as_.uniform == 0)
+    return host_loops().inside(high, isovalue) & ~host_loops().inside(low, isovalue);
+  ulong mask = 0;
+  const glm::uvec3 first = kEdge * place_of(macrocell, macrocells_);
+  for (uint bit = 0; bit < 64; ++bit) {
+    if (low[bit] > high[bit] || !may_hold(low[bit], high[bit], widest, isovalue)) continue;
+    const glm::uvec3 block = first + glm::uvec3(bit & 3, bit >> 2 & 3, bit >> 4);
+    const bool holds = !has_codes || may_hold(low[bit], high[bit], dual_grid_code(block), isovalue);
+    mask |= static_cast<ulong>(holds) << bit;
+  }
+  return mask;
+}
+
 /// A block has cells that change if its dual cells have voxels on both sides: any two of these
-/// voxels are connected by cells of the block, so that one of the cells has both.
+/// voxels are connected by cells of the block, so that one of the cells has both. A block that is
+/// not active is on the side of its values of all planes, too.
 void HostBlocks::select(float isovalue) {
   if (selected_ == isovalue) return;
   selected_.reset();
@@ -247,14 +319,8 @@ void HostBlocks::select(float isovalue) {
     fill(opened_, kNone);
     selection_ = kFirstSelection;
   }
-  const HostLoops &loops = host_loops();
   const std::optional<BlockBox> box = box_of([&](std::size_t macrocell) {
-    const bool none = macrocell_ranges_.low[macrocell] - isovalue >= 0.0f ||
-                      !(macrocell_ranges_.high[macrocell] - isovalue >= 0.0f);
-    return masks_[macrocell] =
-               none ? 0
-                    : loops.inside(ranges_.high.data() + 64 * macrocell, isovalue) &
-                          ~loops.inside(ranges_.low.data() + 64 * macrocell, isovalue);
+    return masks_[macrocell] = blocks_that_hold(macrocell, isovalue);
   });
   const BlockBox around = box.value_or(BlockBox{glm::ivec3(0), glm::ivec3(0)});
   surface_ = {.isovalue = isovalue,
@@ -284,6 +350,10 @@ std::optional<BlockBox> HostBlocks::rounded_box(float isovalue) const {
       mask |= static_cast<ulong>(holds(ranges_, 64 * macrocell + bit)) << bit;
     return mask;
   });
+}
+
+std::array<float, 2> HostBlocks::extremes() const {
+  return {std::ranges::min(macrocell_ranges_.low), std::ranges::max(macrocell_ranges_.high)};
 }
 
 // ---- Blocks, when rays come to them
@@ -355,6 +425,8 @@ void HostBlocks::decode_once(std::size_t block) {
 
 void HostBlocks::decode_to(std::size_t block, float *values) const {
   EncodedBlock bits = encoded(block);
+  bits.min_exponent = decoded_as_.min_exponent;
+  bits.whole_numbers = decoded_as_.whole_numbers;
   std::array<uint, (ISO_MAX_BLOCK_BITS + 31) / 32 + kDecoderAhead> words;
   if (volume_->file) {
     volume_->read_words(bits.first_bit,
@@ -363,6 +435,10 @@ void HostBlocks::decode_to(std::size_t block, float *values) const {
     bits.first_bit = 0;
   }
   host_loops().decode(bits, values);
+  if (decoded_as_.uniform == 0) return;
+  const ValueOffset offset{decoded_as_.uniform, decoded_as_.unit};
+  for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v)
+    values[v] += offset_of_voxel(offset, volume_->bounds, block, v);
 }
 
 /// Finds the cells of the block that change, from the values of its decoded dual grid.

@@ -3,6 +3,7 @@
 // all blocks; for blocks that rays come to, also their voxels, and the cells that an isovalue
 // crosses.
 
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <functional>
@@ -15,9 +16,29 @@
 #include "core/host/host_loops.hpp"
 #include "core/host/host_room.hpp"
 #include "core/volume/block_box.hpp"
+#include "core/zfp/level_bounds.hpp"
 #include "core/zfp/zfp_stream.hpp"
 
 namespace isowave::core {
+
+/// The values that blocks are decoded to: with fewer bit planes, or raised or lowered.
+struct HostValues {
+  /// voxel_error   see with_fewer_planes()
+  /// is_finest     it is the volume itself
+  /// value_range   of the volume
+  /// Throws        Error: as value_offset()
+  HostValues(const CompressedVolume &level, bool is_finest, double voxel_error, FieldBound bound,
+             const std::array<float, 2> &value_range);
+  /// All bit planes of the volume itself.
+  explicit HostValues(const CompressedVolume &level)
+      : min_exponent(level.precision.min_exponent), whole_numbers(level.precision.whole_numbers) {}
+  bool operator==(const HostValues &) const = default;
+
+  std::int32_t min_exponent;
+  bool whole_numbers;
+  double plane_error = 0;       ///< how far values may be from those of all planes
+  float uniform = 0, unit = 0;  ///< of ValueOffset
+};
 
 /// The blocks of a volume. Not thread-safe, except the functions that rays call (BlockMaker).
 class HostBlocks final : private BlockMaker {
@@ -42,14 +63,17 @@ class HostBlocks final : private BlockMaker {
   /// The same within memory that others share. room: must outlive this
   HostBlocks(const CompressedVolume &volume, HostRoom &room, std::uint32_t num_threads);
 
-  /// Finds the blocks that have cells whose corners are not all on one side of an isovalue, for
+  /// Has blocks decoded to these values, and forgets those of others. Before: all planes.
+  void decode_as(const HostValues &values);
+
+  /// Finds the blocks that may have cells whose corners are not all on one side of an isovalue, for
   /// field() and surface(). Does nothing if the isovalue is in use. Other cells cannot have a hit
   /// (cell_intersect.h), so rays may skip them. Decoded blocks stay.
   void select(float isovalue);
 
   /// The field that rays walk through, within run(). Stays valid until the next select().
   HostField field();
-  /// The selected isovalue, and the box around the blocks that have such a cell.
+  /// The selected isovalue, and the box around the blocks that may have such a cell.
   const Surface &surface() const { return surface_; }
 
   /// As HostRoom::run().
@@ -73,6 +97,8 @@ class HostBlocks final : private BlockMaker {
   ///
   /// Returns  nothing if there is no such block
   std::optional<BlockBox> rounded_box(float isovalue) const;
+  /// The least and the largest of all voxels with data, of all bit planes.
+  std::array<float, 2> extremes() const;
 
  private:
   /// An array of which only parts are written to, page by page.
@@ -99,6 +125,9 @@ class HostBlocks final : private BlockMaker {
   void decode_to(std::size_t block, float *values) const;
   void find_changing(std::size_t block, std::span<const std::size_t, 8> dual_grid);
 
+  ulong blocks_that_hold(std::size_t macrocell, float isovalue) const;
+  bool may_hold(float low, float high, std::uint32_t bound_code, float isovalue) const;
+  std::uint32_t dual_grid_code(const glm::uvec3 &block) const;
   void find_ranges();
   void ranges_of_layer(std::uint32_t z, std::span<BlockRange> ranges,
                        std::span<float> sampled) const;
@@ -126,6 +155,7 @@ class HostBlocks final : private BlockMaker {
   Pages values_, changing_;  ///< [block][64]; [block]
   std::vector<std::atomic<uchar>> decoded_, opened_;
   std::atomic<std::uint64_t> num_decoded_ = 0;
+  HostValues decoded_as_;
   uchar selection_;
   std::optional<float> selected_;
   Surface surface_{};

@@ -1,6 +1,7 @@
 #include "core/host/host_levels.hpp"
 
 #include "core/view/detail.hpp"
+#include "core/zfp/stated_errors.hpp"
 
 namespace isowave::core {
 
@@ -27,11 +28,17 @@ HostBlocks &HostLevels::blocks_of(std::size_t level) {
   return *blocks;
 }
 
-std::vector<HostLevel> HostLevels::open(std::span<const FrameParams> frames) {
+std::vector<HostLevel> HostLevels::open(std::span<const FrameParams> frames, double voxel_error,
+                                        FieldBound bound) {
+  // Bounds need the range of values, which a file may get wrong.
+  if (bound != FieldBound::kNone && volumes_[0]->errors_are_stated)
+    check_value_range(*volumes_[0], finest().extremes());
   std::vector<HostLevel> levels;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     if (!draws(frames[i])) continue;
     HostBlocks &blocks = blocks_of(i);
+    blocks.decode_as(
+        {*volumes_[i], i == 0, voxel_error_of(voxel_error, i), bound, volumes_[0]->value_range});
     blocks.select(frames[i].surface.isovalue);
     levels.push_back({frames[i], blocks.field()});
     levels.back().frame.surface = blocks.surface();
@@ -39,6 +46,13 @@ std::vector<HostLevel> HostLevels::open(std::span<const FrameParams> frames) {
   // If there are several bands, a ray may begin at a border that lies outside the box.
   if (levels.size() == 1) levels[0].frame.screen = make_screen_box(levels[0].frame);
   return levels;
+}
+
+HostBlocks &HostLevels::open_finest(float isovalue) {
+  HostBlocks &blocks = blocks_of(0);
+  blocks.decode_as(HostValues(*volumes_[0]));
+  blocks.select(isovalue);
+  return blocks;
 }
 
 void HostLevels::forget() {

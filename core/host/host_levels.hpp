@@ -25,17 +25,21 @@ class HostLevels {
 
   /// Grids of all levels, the finest first.
   const std::vector<VolumeInfo> &infos() const { return infos_; }
-  HostBlocks &finest() { return *blocks_.front(); }
   const HostBlocks &finest() const { return *blocks_.front(); }
 
   /// Prepares the levels that draw a frame.
   ///
-  /// frames   see make_level_frames()
+  /// frames       see make_level_frames()
+  /// voxel_error  FrameRequest::voxel_error
+  /// bound        FrameRequest::bound
   /// Returns  the drawing levels, with their surfaces; the screen box of the first is the rays'.
   /// They
   ///          stay valid until the next call of this or of HostBlocks::select()
-  /// Throws   Error: as HostBlocks
-  std::vector<HostLevel> open(std::span<const FrameParams> frames);
+  /// Throws   Error: as HostBlocks and value_offset(); the file contradicts itself
+  std::vector<HostLevel> open(std::span<const FrameParams> frames, double voxel_error = 0,
+                              FieldBound bound = FieldBound::kNone);
+  /// Prepares the finest level for rays of any origin: its field is that of all bit planes.
+  HostBlocks &open_finest(float isovalue);
 
   HostRoom &room() { return room_; }
   void forget();

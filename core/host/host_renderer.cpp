@@ -13,6 +13,7 @@
 #include "core/platform/memory.hpp"
 #include "core/view/detail.hpp"
 #include "kernels_cl/portable/cell_intersect.h"
+#include "kernels_cl/portable/kept_pixel.h"
 
 namespace isowave::core {
 
@@ -63,7 +64,7 @@ HostRenderer::HostRenderer(const CompressedVolume &volume, const HostRendererOpt
 Abilities HostRenderer::abilities_of(const CompressedVolume &volume) {
   Abilities abilities;
   abilities.levels = !volume.coarser_levels.empty();
-  abilities.given_rays = true;
+  abilities.fewer_planes = abilities.bounds = abilities.given_rays = abilities.kept_picture = true;
   return abilities;
 }
 
@@ -73,7 +74,7 @@ FrameStats HostRenderer::render(const FrameRequest &request) {
   const ImageSize size = size_of(request, abilities());
   const std::vector<FrameParams> frames = make_level_frames(levels_.infos(), request.camera, size,
                                                             request.isovalue, request.voxel_pixels);
-  const std::vector<HostLevel> drawing = levels_.open(frames);
+  const std::vector<HostLevel> drawing = levels_.open(frames, request.voxel_error, request.bound);
   frame_ = frames.front();
   size_ = size;
   open_ = {};
@@ -120,10 +121,11 @@ void HostRenderer::draw_bands(const FrameRequest &request, std::span<const HostL
                 ? host_loops().trace_levels(drawing, part, is_smooth, hits_.data())
                 : host_loops().trace(first.frame, first.field, part, is_smooth, hits_.data());
       },
-      [&](double percent) {
+      [&](std::uint32_t rows) {
         PassStats pass;
         pass.counts.hit_count = static_cast<uint>(num_hits.exchange(0));
-        pass.completed_percent = percent;
+        pass.counts.next_active_count = frame_.view.width * (frame_.view.height - rows);
+        pass.completed_percent = 100.0 * rows / frame_.view.height;
         stats.rays_hit += pass.counts.hit_count;
         stats.passes.push_back(pass);
         return pass;
@@ -151,7 +153,7 @@ void HostRenderer::add_ambient(const FrameRequest &request, std::span<const Host
                                rays, hits_.data(), open_.counts.data());
         }
       },
-      [&](double) {
+      [&](std::uint32_t) {
         PassStats pass;
         pass.completed_percent = 100;
         ++stats.ambient.passes;
@@ -161,8 +163,8 @@ void HostRenderer::add_ambient(const FrameRequest &request, std::span<const Host
 }
 
 /// Calls draw(tile, is_alone), as HostBlocks::run() does, for the tiles of all of the frame's rays,
-/// in bands of whole rows of pixels from the top; after each band, on_pass(after(percent of the
-/// rows that are done)). Returns false if on_pass says to stop, and there is more to draw: bands,
+/// in bands of whole rows of pixels from the top; after each band, on_pass(after(rows that are
+/// done)). Returns false if on_pass says to stop, and there is more to draw: bands,
 /// or what follows.
 template <class Draw, class After>
 bool HostRenderer::for_bands(const OnPass &on_pass, bool more_follows, Draw draw, After after) {
@@ -182,7 +184,7 @@ bool HostRenderer::for_bands(const OnPass &on_pass, bool more_follows, Draw draw
           draw(RayTile{x, y, std::min(x + kTileRays, width), std::min(y + tile_rows, end_row)},
                is_alone);
         });
-    const PassStats pass = after(100.0 * end_row / rows);
+    const PassStats pass = after(end_row);
     if (on_pass && !on_pass(pass) && (end_row < rows || more_follows)) return false;
   }
   return true;
@@ -194,8 +196,7 @@ std::vector<HitRecord> HostRenderer::cast_rays(std::span<const WorldRay> rays, f
   const std::vector<IndexRay> index_rays = make_index_rays(info_, rays);
   FrameParams frame = make_grid_params(info_);
   frame.view.t_scale = 1;
-  HostBlocks &blocks = levels_.finest();
-  blocks.select(isovalue);
+  HostBlocks &blocks = levels_.open_finest(isovalue);
   frame.surface = blocks.surface();
   std::vector<HitRecord> hits(rays.size(), no_hit());
   const HostField field = blocks.field();
@@ -221,6 +222,36 @@ Camera HostRenderer::camera(std::span<const float> isovalues, std::optional<Imag
     box->end = glm::max(box->end, blocks->end);
   }
   return surface_camera(info_, box, of_picture);
+}
+
+void HostRenderer::keep_picture() {
+  check_has_picture();
+  kept_ = hits_;
+  kept_size_ = size_;
+}
+
+void HostRenderer::enlarge_kept(const FrameRequest &request) {
+  core::check(request, abilities());
+  const ImageSize size = size_of(request, abilities());
+  frame_ = make_frame_params(info_, request.camera, size, request.isovalue);
+  size_ = size;
+  open_ = {};
+  hits_.resize(size.num_rays());
+  show_kept(true);
+}
+
+/// Fills the picture from the kept one, enlarged: rays without a hit, or all.
+void HostRenderer::show_kept(bool everywhere) {
+  check_has_picture();
+  if (kept_.empty()) throw Error("there is no picture: none was kept");
+  parallel_for(frame_.view.height, num_threads_, [&](std::uint64_t row, std::uint32_t) {
+    const auto first = static_cast<uint>(row * frame_.view.width);
+    for (uint ray = first; ray < first + frame_.view.width; ++ray) {
+      if (!everywhere && hits_[ray].t < INFINITY) continue;
+      hits_[ray] =
+          kept_[kept_pixel(&frame_.view, kept_size_.ray_columns(), kept_size_.ray_rows(), ray)];
+    }
+  });
 }
 
 void HostRenderer::check_has_picture() const {

@@ -54,6 +54,10 @@ class HostRenderer : public Renderer {
   const OpenCounts &open() const { return open_; }
   Image8 shade(const Appearance &appearance = {}) override;
 
+  void keep_picture() override;
+  void fill_from_kept() override { show_kept(false); }
+  void enlarge_kept(const FrameRequest &request) override;
+
   /// Forgets all decoded blocks, and keeps their memory for other blocks.
   void clear_cache() override { levels_.forget(); }
   std::uint64_t num_decoded_blocks() const { return levels_.num_decoded(); }  ///< from the start
@@ -62,6 +66,7 @@ class HostRenderer : public Renderer {
 
  private:
   void check_has_picture() const;
+  void show_kept(bool everywhere);
   void draw_bands(const FrameRequest &request, std::span<const HostLevel> drawing,
                   FrameStats &stats);
   void add_ambient(const FrameRequest &request, std::span<const HostLevel> drawing,
@@ -77,6 +82,8 @@ class HostRenderer : public Renderer {
   ImageSize size_;
   std::vector<HitRecord> hits_;
   OpenCounts open_;
+  std::vector<HitRecord> kept_;
+  ImageSize kept_size_;
 };
 
 }  // namespace isowave::core
