@@ -48,10 +48,9 @@ class HostRenderer : public Renderer {
 
   ImageSize size() const override { return size_; }
   std::vector<HitRecord> hits() override;
-  std::vector<float> depth() override;
   /// Counts of open ambient rays of the last frame's hits.
   const OpenCounts &open() const { return open_; }
-  Image8 shade(const Appearance &appearance = {}) override;
+  FrameArrays fetch(const WantedArrays &wanted, const Appearance &appearance) override;
 
   /// Forgets all decoded blocks, and keeps their memory for other blocks.
   void clear_cache() override { blocks_.forget(); }
@@ -74,6 +73,7 @@ class HostRenderer : public Renderer {
   Normals normals_ = Normals::kSmooth;
   std::vector<HitRecord> hits_;
   OpenCounts open_;
+  HostMemory memory_;
 };
 
 }  // namespace isowave::core
