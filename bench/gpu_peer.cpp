@@ -51,11 +51,15 @@ VoxelsInMemory read_voxels(const Options &options, const ocl::DeviceInfo &device
   return voxels;
 }
 
+/// A step of 8 bits.
+float step_of(const VoxelsInMemory &voxels) {
+  const auto [least, most] = std::ranges::minmax_element(voxels.values);
+  return (*most - *least) / 255;
+}
+
 /// The one asked for, or that of 8 bits.
 float max_error_of(const Options &options, const VoxelsInMemory &voxels) {
-  if (options.max_error) return *options.max_error;
-  const auto [least, most] = std::ranges::minmax_element(voxels.values);
-  return (*most - *least) / 510;
+  return options.max_error ? *options.max_error : step_of(voxels) / 2;
 }
 
 std::vector<NamedSide> make_peers(const Options &options, const VoxelsInMemory &voxels) {
@@ -105,15 +109,14 @@ void print_sides(const std::vector<SideResult> &sides) {
         ours ? thrice("")
              : fmt::format("{:.3f} ({:.3f})", median_of(side, "kernel"), median_of(side, "hits")),
         ours ? thrice("_picture") : fmt::format("{:.3f}", median_of(side, "picture")),
-        double(side.costs.bytes) / (1 << 20),
-        ours ? "in cold" : fmt::format("{:.3f}", median_of(side, "new_isovalue")),
+        double(side.costs.bytes) / (1 << 20), fmt::format("{:.3f}", median_of(side, "new")),
         side.costs.build_ms, side.costs.max_voxel_error, side.difference.missed,
         side.difference.false_hits, side.difference.p99, side.difference.largest);
   }
   fmt::print(
       "Medians over views and rounds. hits: of isowave cold, next and warm, by the wall clock; of "
       "others\nthe kernel by CUDA's events (and the wall clock). MiB: buffers without pictures, of "
-      "isowave with\nthem. new iso.: finding what to skip. build: ms. error: largest of a voxel. "
+      "isowave with\nthem. new iso.: its first hits. build: ms. error: largest of a voxel. "
       "missed, false: pixels\nbeside isowave's without loss; p99, largest: distance of hits, "
       "voxels.\n");
 }
@@ -126,6 +129,7 @@ void compare(const Options &options, const std::string &command) {
   const Views views{.cameras = orbit_cameras(voxels.info, options.orbit),
                     .size = {options.size.at(0), options.size.at(1)},
                     .isovalue = options.isovalue,
+                    .other_isovalue = options.isovalue + step_of(voxels),
                     .rounds = options.rounds};
   ordered_json json = {{"program", "gpu_peer"}, {"command", command}, {"date", utc_now()}};
   std::vector<std::unique_ptr<IsowaveSide>> isowave;

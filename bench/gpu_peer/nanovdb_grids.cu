@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <mutex>
+#include <utility>
 
 #include "bench/gpu_peer/walked_side.cuh"
 
@@ -20,7 +21,7 @@ struct NanoVoxels {
 
   class Reader {
    public:
-    PEER_BOTH explicit Reader(const NanoVoxels &voxels) : accessor_(voxels.grid->getAccessor()) {}
+    PEER_BOTH explicit Reader(const NanoVoxels &voxels) : accessor_(*voxels.grid) {}
     PEER_BOTH void enter(const int cell[3]) {
       leaf_ = accessor_.probeLeaf(nanovdb::Coord(cell[0], cell[1], cell[2]));
     }
@@ -30,29 +31,36 @@ struct NanoVoxels {
     /// Straight from the leaf; corners in other leaves through the accessor, leaf by leaf.
     PEER_BOTH void corners(const int cell[3], float f[8]) const {
       const int x = cell[0] & 7, y = cell[1] & 7, z = cell[2] & 7;
-      const int offset = x << 6 | y << 3 | z;
-      const bool is_within = leaf_ != nullptr && x < 7 && y < 7 && z < 7;
-      if (is_within) {
-        for (int i = 0; i < 8; ++i) f[i] = in_leaf(offset + offset_of(i));
-        return;
-      }
-      for (int i = 0; i < 8; ++i) {
-        const int dx = i >> 2, dy = i >> 1 & 1, dz = i & 1;
-        const bool is_here = leaf_ != nullptr && x + dx < 8 && y + dy < 8 && z + dz < 8;
-        f[i] = is_here ? in_leaf(offset + offset_of(i))
-                       : value(cell[0] + dx, cell[1] + dy, cell[2] + dz);
+      if (leaf_ != nullptr && x < 7 && y < 7 && z < 7) {
+        for (int i = 0; i < 8; ++i) f[i] = in_leaf(x << 6 | y << 3 | z, i);
+      } else {
+        border_corners(cell, f, std::make_integer_sequence<int, 8>{});
       }
     }
 
    private:
-    PEER_BOTH static int offset_of(int corner) {
-      return (corner >> 2) * 64 + (corner >> 1 & 1) * 8 + (corner & 1);
+    /// Not a loop, since that is not unrolled: f would be in memory, and reads would wait for each
+    /// other.
+    template <int... kCorners>
+    PEER_BOTH void border_corners(const int cell[3], float f[8],
+                                  std::integer_sequence<int, kCorners...>) const {
+      ((f[kCorners] = border_corner<kCorners>(cell)), ...);
     }
-    PEER_BOTH float in_leaf(int offset) const {
+    template <int kCorner>
+    PEER_BOTH float border_corner(const int cell[3]) const {
+      constexpr int dx = kCorner >> 2, dy = kCorner >> 1 & 1, dz = kCorner & 1;
+      const int x = cell[0] & 7, y = cell[1] & 7, z = cell[2] & 7;
+      if (leaf_ != nullptr && x + dx < 8 && y + dy < 8 && z + dz < 8)
+        return in_leaf(x << 6 | y << 3 | z, kCorner);
+      return value(cell[0] + dx, cell[1] + dy, cell[2] + dz);
+    }
+    PEER_BOTH float in_leaf(int offset, int corner) const {
+      offset += (corner >> 2) * 64 + (corner >> 1 & 1) * 8 + (corner & 1);
       return static_cast<float>(leaf_->getValue(static_cast<std::uint32_t>(offset)));
     }
 
-    nanovdb::DefaultReadAccessor<Build> accessor_;
+    /// Remembers a leaf and its node; the root is one step away, and registers are scarce.
+    nanovdb::ReadAccessor<Build, 0, 1> accessor_;
     const typename nanovdb::NanoTree<Build>::LeafNodeType *leaf_ = nullptr;
   };
 };

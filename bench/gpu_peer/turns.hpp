@@ -23,6 +23,7 @@ struct Views {
   std::vector<Camera> cameras;
   ImageSize size;
   float isovalue = 0;
+  float other_isovalue = 0;  ///< is drawn before a new isovalue is timed
   std::uint32_t rounds = 1;
 };
 
@@ -47,8 +48,12 @@ class IsowaveSide {
   GridCosts costs_;
 };
 
-/// What was measured of a side. Kinds of times: of isowave cold, next, warm, and cold_picture, ...;
-/// of a peer kernel (CUDA's events), hits (wall clock), picture and new_isovalue.
+/// What was measured of a side. Kinds of times, hits where they are not called pictures:
+///
+///   new           hits of a new isovalue; of isowave, with nothing decoded
+///   new_isovalue  the part of it in which a peer finds what rays skip
+///   cold, next, warm, cold_picture, ...  isowave's frames, by the wall clock
+///   kernel, hits, picture                a peer's, by CUDA's events, the others by the wall clock
 struct SideResult {
   std::string name;
   bool is_isowave = false;

@@ -56,7 +56,7 @@ def gpu_peers(rows):
         "side",
         "hits: any view, or cold / next / warm, ms",
         "picture on the host",
-        "new isovalue",
+        "hits of a new isovalue",
         "device memory",
         "made in, s",
         "largest error of a voxel",
@@ -73,7 +73,7 @@ def gpu_peers(rows):
             times(row, *(f"{kind}_picture" for kind in kinds))
             if is_isowave
             else times(row, "picture"),
-            "in cold" if is_isowave else times(row, "new_isovalue"),
+            times(row, "new"),
             mebibytes(row["device_bytes"]),
             f"{row['build_ms'] / 1000:.2f}",
             f"{row['max_voxel_error']:.2g}",
