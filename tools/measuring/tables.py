@@ -4,7 +4,7 @@ its own, the head first."""
 import pathlib
 import statistics
 
-from measuring import bricks, paper_article, paper_tables
+from measuring import bricks, gpu_peers, paper_article, paper_tables
 from measuring.cells import mebibytes, ms, name_of, percent
 
 
@@ -467,6 +467,7 @@ TABLES = {
         ("stability", stability, leaks),
         ("cpus", cpus),
         ("peer", peer),
+        ("gpu_peer", gpu_peers.gpu_peers),
         ("paper", *paper_article.TABLES, *paper_tables.TABLES),
         ("devices", paper_tables.by_device),
         ("bricks", bricks.in_bricks),
