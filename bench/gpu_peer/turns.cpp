@@ -80,7 +80,7 @@ struct Turn {
 /// The first side's frame of a view, which others are compared with.
 struct Expected {
   std::vector<float> depth;
-  Image8 picture;
+  std::vector<std::uint8_t> picture;
 };
 
 template <class Work>
@@ -107,12 +107,12 @@ void draw_turn(IsowaveSide &side, const Turn &turn, SideResult &result, Expected
     result.ms[kind].push_back(renderer.render(*frame).total_ms);
   renderer.clear_cache();
   for (const auto &[kind, frame] : frames) {
-    Image8 picture;
+    FrameArrays arrays;
     result.ms[std::string(kind) + "_picture"].push_back(wall_ms([&] {
       renderer.render(*frame);
-      picture = renderer.shade();
+      arrays = renderer.fetch({.picture = true}, {});
     }));
-    if (expected != nullptr && frame == &request) expected->picture = std::move(picture);
+    if (expected != nullptr && frame == &request) expected->picture = arrays.picture.copy();
   }
   if (expected == nullptr) return;
   renderer.render(request);
@@ -138,7 +138,7 @@ void draw_turn(GridSide &side, const Turn &turn, SideResult &result, HitComparis
   for (const GridHit &hit : side.hits()) depth.push_back(hit.t);
   comparison.add(depth, expected.depth);
   result.picture_difference =
-      std::max(result.picture_difference, share_of_other_bytes(picture, expected.picture.pixels));
+      std::max(result.picture_difference, share_of_other_bytes(picture, expected.picture));
 }
 
 }  // namespace
