@@ -260,7 +260,7 @@ def test_a_quick_renderer_becomes_the_devices(volume, renderer):
 
 
 def test_arrays_are_the_renderers_memory_and_stay(volume):
-    """They are not copied; what is kept does not change, and memory of what is gone is used again."""
+    """They are not copied. Kept arrays do not change; the memory of others is used again."""
     renderer = volume.renderer(size=SIZE)
     camera = renderer.camera(6)
     views = [isowave.Camera(camera.eye[::-1], camera.at), camera]
