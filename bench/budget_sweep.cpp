@@ -65,7 +65,7 @@ ordered_json budget_json(const BudgetTimes &budget) {
   for (const auto &[kind, member] : kKinds) {
     json[fmt::format("{}_ms", kind)] =
         budget.views.empty() ? ordered_json()
-                             : spread_json(spread_of(all_times(budget.views, member)));
+                             : spread_json(spread_of(all_times(budget.views, member, arrays_ms)));
   }
   json["passes"] =
       budget.views.empty() ? ordered_json() : ordered_json(median_of_frames(budget, num_passes));
@@ -125,7 +125,8 @@ BudgetSweep sweep_budgets(const ocl::DeviceInfo &device_info, const CompressedVo
       common.options = renderer.options();
     }
     if (check_pictures(renderer, common, cameras, max_passes, pictures)) {
-      budget.views = measure_views(renderer, cameras, common.request(), common.rounds);
+      budget.views =
+          measure_views(renderer, cameras, common.request(), common.wanted, common.rounds);
     } else if (sweep.budgets.empty()) {
       throw Error(
           "the largest budget, {} bytes, takes more than {} passes a frame: allow more by "
@@ -155,7 +156,7 @@ void print_sweep(const BudgetSweep &sweep) {
       continue;
     }
     for (const auto &[kind, member] : kKinds) {
-      fmt::print(" {:>27}", spread_text(spread_of(all_times(budget.views, member))));
+      fmt::print(" {:>27}", spread_text(spread_of(all_times(budget.views, member, arrays_ms))));
     }
     fmt::print(" {:>8.0f}\n", median_of_frames(budget, num_passes));
   }

@@ -36,6 +36,7 @@ struct Options {
   bool resident = true;
   std::string normals = "cell";
   std::uint32_t ambient_rays = 0;
+  bool depth = false;
   tools::RendererFlags renderer;
 };
 
@@ -90,6 +91,7 @@ FrameReport make_report(const Options &options, const CompressedVolume &volume,
   report.options = tools::to_renderer_options(
       options.renderer, {options.size.at(0), options.size.at(1), options.samples});
   report.ambient_rays = options.ambient_rays;
+  report.wanted.depth = options.depth;
   report.options.with_given_rays = options.ambient_rays != 0;
   report.num_views = options.orbit;
   report.rounds = options.rounds;
@@ -114,7 +116,8 @@ FrameReport measure(const Options &options, std::string command) {
     of_cells.ambient_rays = 0;
     renderer.render(seen_from(cameras.front(), of_cells));
     first_hits = renderer.hits();
-    report.views = measure_views(renderer, cameras, report.request(), options.rounds);
+    report.views =
+        measure_views(renderer, cameras, report.request(), report.wanted, options.rounds);
     report.peak_bytes = device.ledger().peak();
     report.memory = tools::memory_json(device.ledger());
   }
@@ -225,6 +228,7 @@ void add_options(CLI::App &app, Options &options) {
       "pictures must be the same");
   tools::add_normals_option(app, options.normals);
   tools::add_ambient_option(app, options.ambient_rays);
+  app.add_flag("--depth", options.depth, "bring the picture's depth to the host, too");
   app.add_option("--max-passes", options.max_passes,
                  "of --budgets: a budget at which a frame takes more is not timed")
       ->check(CLI::PositiveNumber)

@@ -1,18 +1,28 @@
 #include "bench/frame_measure.hpp"
 
+#include <chrono>
 #include <cstring>
 #include <glm/gtc/quaternion.hpp>
 
 #include "core/base/error.hpp"
+#include "core/base/ms_since.hpp"
 #include "core/paper/resident.hpp"
 
 namespace isowave::core::bench {
 
-std::vector<double> all_times(const std::vector<ViewTimes> &views,
-                              std::vector<FrameStats> ViewTimes::*kind) {
+double hits_ms(const TimedFrame &frame) {
+  return frame.total_ms;
+}
+
+double arrays_ms(const TimedFrame &frame) {
+  return frame.arrays_ms;
+}
+
+std::vector<double> all_times(const std::vector<ViewTimes> &views, FramesOfView kind,
+                              double (*ms)(const TimedFrame &)) {
   std::vector<double> times;
   for (const ViewTimes &view : views) {
-    for (const FrameStats &frame : view.*kind) times.push_back(frame.total_ms);
+    for (const TimedFrame &frame : view.*kind) times.push_back(ms(frame));
   }
   return times;
 }
@@ -24,14 +34,24 @@ Camera turned(Camera camera) {
 }
 
 std::vector<ViewTimes> measure_views(DeviceRenderer &renderer, const std::vector<Camera> &cameras,
-                                     const FrameRequest &request, std::uint32_t rounds) {
+                                     const FrameRequest &request, const WantedArrays &wanted,
+                                     std::uint32_t rounds) {
+  FrameArrays arrays;  // a user has the last frame's until the next is there
+  const auto draw = [&](const Camera &camera) {
+    const auto begin = std::chrono::steady_clock::now();
+    TimedFrame frame{renderer.render(seen_from(camera, request))};
+    arrays = renderer.fetch(wanted, {});
+    frame.arrays_ms = ms_since(begin);
+    return frame;
+  };
+  for (int frame = 0; frame < 3; ++frame) draw(cameras.front());  // makes the arrays' memory
   std::vector<ViewTimes> views(cameras.size());
   for (std::uint32_t round = 0; round < rounds; ++round) {
     for (std::size_t view = 0; view < cameras.size(); ++view) {
       renderer.clear_cache();
-      views[view].cold.push_back(renderer.render(seen_from(cameras[view], request)));
-      views[view].warm.push_back(renderer.render(seen_from(cameras[view], request)));
-      views[view].next.push_back(renderer.render(seen_from(turned(cameras[view]), request)));
+      views[view].cold.push_back(draw(cameras[view]));
+      views[view].warm.push_back(draw(cameras[view]));
+      views[view].next.push_back(draw(turned(cameras[view])));
     }
   }
   return views;

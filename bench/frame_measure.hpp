@@ -9,20 +9,28 @@
 
 namespace isowave::core::bench {
 
-/// One view, drawn once per round.
-struct ViewTimes {
-  std::vector<FrameStats> cold;  ///< nothing decoded before
-  std::vector<FrameStats> warm;  ///< the same view again
-  std::vector<FrameStats> next;  ///< then one degree further around the volume
+/// What a frame has taken. FrameStats::total_ms is the time until its hits are on the device.
+struct TimedFrame : FrameStats {
+  double arrays_ms = 0;  ///< until the wanted arrays are in the host's memory, with that
 };
 
+/// One view, drawn once per round.
+struct ViewTimes {
+  std::vector<TimedFrame> cold;  ///< nothing decoded before
+  std::vector<TimedFrame> warm;  ///< the same view again
+  std::vector<TimedFrame> next;  ///< then one degree further around the volume
+};
+using FramesOfView = std::vector<TimedFrame> ViewTimes::*;
+
 /// The kinds of frames by name.
-inline constexpr std::pair<const char *, std::vector<FrameStats> ViewTimes::*> kKinds[] = {
+inline constexpr std::pair<const char *, FramesOfView> kKinds[] = {
     {"cold", &ViewTimes::cold}, {"warm", &ViewTimes::warm}, {"next", &ViewTimes::next}};
 
+double hits_ms(const TimedFrame &frame);
+double arrays_ms(const TimedFrame &frame);
 /// ms of all frames of one kind.
-std::vector<double> all_times(const std::vector<ViewTimes> &views,
-                              std::vector<FrameStats> ViewTimes::*kind);
+std::vector<double> all_times(const std::vector<ViewTimes> &views, FramesOfView kind,
+                              double (*ms)(const TimedFrame &));
 
 /// The camera one degree further around the vertical through the point it looks at.
 Camera turned(Camera camera);
@@ -31,7 +39,8 @@ Camera turned(Camera camera);
 /// before: a driver may compile a kernel when it first runs, and an isovalue's first frame finds
 /// its blocks.
 std::vector<ViewTimes> measure_views(DeviceRenderer &renderer, const std::vector<Camera> &cameras,
-                                     const FrameRequest &request, std::uint32_t rounds);
+                                     const FrameRequest &request, const WantedArrays &wanted,
+                                     std::uint32_t rounds);
 
 double num_passes(const FrameStats &frame);
 

@@ -18,14 +18,10 @@ using nlohmann::ordered_json;
 
 /// A value of every frame of the list.
 template <class Value>
-std::vector<double> each(const std::vector<FrameStats> &frames, const Value &value) {
+std::vector<double> each(const std::vector<TimedFrame> &frames, const Value &value) {
   std::vector<double> values(frames.size());
   std::transform(frames.begin(), frames.end(), values.begin(), value);
   return values;
-}
-
-double total_ms(const FrameStats &frame) {
-  return frame.total_ms;
 }
 
 /// Sum of one of the counts over a frame's passes.
@@ -111,22 +107,24 @@ double column_of(const FrameReport &report, const ViewTimes &view, const Column 
 }
 
 /// How many times the floor a kind of frame takes, of the medians.
-double over_floor(const FloorTimes &floor, const std::vector<ViewTimes> &views,
-                  std::vector<FrameStats> ViewTimes::*kind) {
-  return median(all_times(views, kind)) / median(floor.all());
+double over_floor(const FloorTimes &floor, const std::vector<ViewTimes> &views, FramesOfView kind) {
+  return median(all_times(views, kind, hits_ms)) / median(floor.all());
 }
 
 void print_row(const std::string &name, const std::vector<std::string> &cells) {
   fmt::print("{:<7}", name);
   for (std::size_t i = 0; i < cells.size(); ++i) {
-    fmt::print(" {:>{}}", cells[i], i < std::size(kKinds) ? 23 : 10);
+    fmt::print(" {:>{}}", cells[i], i < 2 * std::size(kKinds) ? 23 : 10);
   }
   fmt::print("\n");
 }
 
 void print_views(const FrameReport &report) {
   std::vector<std::string> header;
-  for (const auto &[kind, member] : kKinds) header.push_back(fmt::format("{} ms", kind));
+  for (const auto &[kind, member] : kKinds) {
+    header.push_back(fmt::format("{} ms", kind));
+    header.push_back(fmt::format("{}, hits", kind));
+  }
   for (const Column &column : kColumns) header.emplace_back(column.name);
   print_row("view", header);
   std::vector<std::vector<double>> columns(std::size(kColumns));
@@ -134,7 +132,8 @@ void print_views(const FrameReport &report) {
     const ViewTimes &view = report.views[v];
     std::vector<std::string> cells;
     for (const auto &[kind, member] : kKinds) {
-      cells.push_back(spread_text(spread_of(each(view.*member, total_ms))));
+      for (const auto ms : {arrays_ms, hits_ms})
+        cells.push_back(spread_text(spread_of(each(view.*member, ms))));
     }
     for (std::size_t c = 0; c < columns.size(); ++c) {
       columns[c].push_back(column_of(report, view, kColumns[c]));
@@ -143,8 +142,10 @@ void print_views(const FrameReport &report) {
     print_row(std::to_string(v), cells);
   }
   std::vector<std::string> cells;
-  for (const auto &[kind, member] : kKinds)
-    cells.push_back(spread_text(spread_of(all_times(report.views, member))));
+  for (const auto &[kind, member] : kKinds) {
+    for (const auto ms : {arrays_ms, hits_ms})
+      cells.push_back(spread_text(spread_of(all_times(report.views, member, ms))));
+  }
   for (std::size_t c = 0; c < columns.size(); ++c) {
     cells.push_back(cell_text(median(columns[c]), kColumns[c].precision));
   }
@@ -182,8 +183,8 @@ void print_stages(const FrameReport &report) {
   fmt::print("  {:<14}{:>9.2f}\n", "sum", sum);
 }
 
-ordered_json frame_json(const FrameReport &report, const FrameStats &frame) {
-  ordered_json json = {{"total_ms", frame.total_ms}};
+ordered_json frame_json(const FrameReport &report, const TimedFrame &frame) {
+  ordered_json json = {{"total_ms", frame.arrays_ms}, {"hits_ms", frame.total_ms}};
   for (const Column &column : kColumns) json[column.json_name] = column.value(report, frame);
   return json;
 }
@@ -247,6 +248,7 @@ ordered_json options_json(const FrameReport &report) {
   json["voxel_pixels"] = report.voxel_pixels;
   json["normals"] = to_string(report.normals);
   json["ambient"] = report.ambient_rays;
+  json["depth"] = report.wanted.depth;
   return json;
 }
 
@@ -259,7 +261,8 @@ void print_report(const FrameReport &report) {
   print_floor(report, report.views);
   fmt::print(
       "Times are wall clock, median (min..max) over the rounds, and in the last row over views and "
-      "rounds.\n"
+      "rounds:\n"
+      "until {} in the host's memory, and until hits are on the device.\n"
       "cold: nothing decoded before; warm: the same view again; next: then one degree further. The "
       "other\n"
       "columns are a cold frame's. visible: blocks with rays, summed over the passes, of all "
@@ -267,7 +270,8 @@ void print_report(const FrameReport &report) {
       "blocks; nrm blocks, nrm passes: those for smooth normals, on top; nrm ms: theirs, of the "
       "frame;\n"
       "N_spec: median over the passes; util: intersected ray-block pairs per pass, of all pixels. "
-      "resident\nfloor: the whole volume decoded, one kernel, no cache.\n");
+      "resident\nfloor: the whole volume decoded, one kernel, no cache.\n",
+      report.wanted.depth ? "picture and depth are" : "the picture is");
   print_stages(report);
 }
 
@@ -277,7 +281,8 @@ ordered_json to_json(const FrameReport &report) {
   for (const auto &[name, value] : report.run_info) json["context"][name] = value;
   json["options"] = options_json(report);
   for (const auto &[kind, member] : kKinds) {
-    json["total_ms"][kind] = spread_json(spread_of(all_times(report.views, member)));
+    json["total_ms"][kind] = spread_json(spread_of(all_times(report.views, member, arrays_ms)));
+    json["hits_ms"][kind] = spread_json(spread_of(all_times(report.views, member, hits_ms)));
   }
   for (const Column &column : kColumns) {
     std::vector<double> values;
@@ -293,7 +298,7 @@ ordered_json to_json(const FrameReport &report) {
   for (const ViewTimes &view : report.views) {
     ordered_json frames;
     for (const auto &[kind, member] : kKinds) {
-      for (const FrameStats &frame : view.*member)
+      for (const TimedFrame &frame : view.*member)
         frames[kind].push_back(frame_json(report, frame));
     }
     json["frames"].push_back(std::move(frames));

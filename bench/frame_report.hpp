@@ -22,6 +22,7 @@ struct FrameReport {
   double voxel_pixels = 0;
   Normals normals = Normals::kCell;
   std::uint32_t ambient_rays = 0;
+  WantedArrays wanted{.picture = true};
   RendererOptions options;
   std::uint32_t num_views = 0, rounds = 0;
   std::vector<ViewTimes> views;

@@ -18,10 +18,11 @@ struct ShadeInput : FrameRig {
     start();
     while (run_pass().next_active_count != 0) {
     }
-    check(run().pixels == shade_scalar(params, appearance, rays.hits.read()).pixels,
+    check(std::ranges::equal(run().picture,
+                             shade_scalar(params, appearance, rays.hits.read()).pixels),
           "shaded pixels");
   }
-  Image8 run() { return shade(appearance, rays); }
+  FrameArrays run() { return shade({.picture = true}, appearance, {}, rays, 1); }
 
   ShadeParams appearance;
   Shade shade;
@@ -31,7 +32,7 @@ void shade_hits(benchmark::State &state) {
   auto &in = input<ShadeInput>(state.range(0));
   const auto pixels = static_cast<double>(in.rays.num_rays);
   measure(
-      state, {pixels, pixels * (4 * sizeof(float) + 2 * sizeof(uint))}, [] {},
+      state, {pixels, pixels * (4 * sizeof(float) + 2 * 3)}, [] {},
       [&] { benchmark::DoNotOptimize(in.run()); });
 }
 

@@ -63,9 +63,18 @@ Camera TwinRenderer::camera(std::span<const float> isovalues, std::optional<Imag
   return HostRenderer(volume_).camera(isovalues, size.value_or(largest_));
 }
 
-Image8 TwinRenderer::shade(const Appearance &appearance) {
-  return shade_scalar(frame_, make_shade_params(volume_.info, appearance), hits(), size_.samples,
-                      open_);
+FrameArrays TwinRenderer::fetch(const WantedArrays &wanted, const Appearance &appearance) {
+  const std::vector<HitRecord> hits = this->hits();
+  const ShadeParams shading = make_shade_params(volume_.info, appearance);
+  FrameArrays arrays;
+  if (wanted.picture) {
+    const Image8 image = shade_scalar(frame_, shading, hits, size_.samples, open_);
+    arrays.picture = memory_.array<std::uint8_t>(image.pixels.size());
+    std::ranges::copy(image.pixels, arrays.picture.begin());
+  }
+  const HitMap map = make_hit_map(levels());
+  add_hit_arrays(wanted, hits, shading, &map, memory_, arrays);
+  return arrays;
 }
 
 std::vector<HitRecord> TwinRenderer::hits() {

@@ -28,7 +28,7 @@ class TwinRenderer : public Renderer {
   Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {}) override;
 
   ImageSize size() const override { return size_; }
-  Image8 shade(const Appearance &appearance = {}) override;
+  FrameArrays fetch(const WantedArrays &wanted, const Appearance &appearance) override;
   std::vector<HitRecord> hits() override;
   void clear_cache() override { twin_.reset(); }
   std::uint64_t memory_bytes() const override { return 0; }
@@ -50,6 +50,7 @@ class TwinRenderer : public Renderer {
   FrameParams frame_{};
   std::vector<HitRecord> hits_;
   OpenCounts open_;
+  HostMemory memory_;
 };
 
 }  // namespace isowave::core

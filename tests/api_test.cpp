@@ -104,11 +104,12 @@ TEST_P(ApiOnDevice, FramesAreThoseOfTheEngine) {
   EXPECT_EQ(test::read_file(folder / "a.png"), std::string(png.begin(), png.end()));
   Frame transparent;
   transparent.size = {2, 1, 1};
-  transparent.picture = {10, 20, 30, 255, 40, 50, 60, 0};
+  const std::vector<std::uint8_t> rgba{10, 20, 30, 255, 40, 50, 60, 0};
+  transparent.picture = Array<std::uint8_t>(rgba);
   save_png(transparent, folder / "b.png");
   const core::Image8 read = core::read_png(folder / "b.png");
   EXPECT_EQ(read.channels, 4);
-  EXPECT_EQ(read.pixels, transparent.picture);
+  EXPECT_EQ(read.pixels, rgba);
 }
 
 /// Where coarse levels draw, hits are at the depth that is said, too.

@@ -56,12 +56,14 @@ if kind == "google":
 else:
     rounds, group = [float(ms) for ms in rest[0].split(",")], float(rest[1])
     def view(factor):
-        times = [{"total_ms": factor * ms} for ms in rounds]
+        times = [{"total_ms": factor * ms, "hits_ms": factor * ms / 2} for ms in rounds]
         return {"cold": times, "warm": times}
     frames = [view(factor) for factor in (0.5, 1, 2)]
     spread = {"median": statistics.median(rounds), "min": 0.5 * min(rounds), "max": 2 * max(rounds)}
     document = {"program": "frame_bench", "context": {"device": "d"}, "options": {"grouping": path},
                 "total_ms": {"cold": spread, "warm": spread}, "frames": frames, "setup_ms": 7.0,
+                "hits_ms": {kind: {key: ms / 2 for key, ms in spread.items()}
+                            for kind in ("cold", "warm")},
                 "stage_ms": {"group": {"median": group, "min": 0.9 * group, "max": 1.1 * group}},
                 "median": {"passes": 3, "decoded_blocks": 100}, "memory": {"peak": 1 << 20}}
     if len(rest) > 2:
@@ -118,6 +120,11 @@ row stage/group '0.2 +0.8 +4.000 +\(3.273..4.889\) +slower'
 write frames slow.json 20,21,22 0.8
 compare 2 radix.json slow.json --fail
 row frame/warm '10.2 +21 +2.059 +\(1.923..2.200\) +slower'
+
+sed 's/"hits_ms"/"other"/g' slow.json >hits_alone.json
+compare 2 radix.json hits_alone.json --fail # 5.1 ms until hits, and 21 ms
+row hits/warm '5.1 +21 +4.118 +.* +slower'
+! grep -q '^frame/' out || fail "no time until pictures: $(cat out)"
 
 write frames floor.json 20,21,22 0.8 5
 write frames floorless.json 20,21,22 0.8 null

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "core/base/team.hpp"
+#include "core/io/png.hpp"
 
 namespace isowave::core {
 namespace {
@@ -76,8 +77,8 @@ TEST(Compose, ColoursOfTheFirstBrickThatIsHit) {
       Image8 image{std::uint32_t(num_rays), 1, 3, std::vector<std::uint8_t>(3 * num_rays)};
       const std::span all = words;
       const std::size_t part = num_words / 2;
-      const std::size_t num_hits =
-          take(all.first(part), 0, image) + take(all.subspan(part), rays_per_word * part, image);
+      const std::size_t num_hits = take(all.first(part), 0, image.pixels) +
+                                   take(all.subspan(part), rays_per_word * part, image.pixels);
       EXPECT_EQ(image.pixels, expected.pixels);
       EXPECT_EQ(num_hits, expected.num_hits);
     };

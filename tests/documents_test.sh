@@ -32,6 +32,10 @@ if [ -x "$programs/bench/peer_bench" ]; then
   measured --only peer
   tables+=(peer)
 fi
+if [ -x "$programs/bench/gpu_peer" ]; then
+  measured --only gpu_peer
+  tables+=(gpu_peers)
+fi
 if [ -x "$programs/bench/brick_bench" ]; then
   export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
   measured --only bricks
@@ -70,6 +74,22 @@ from measuring.paper import ARTICLE, STAND_INS, in_collection, rate_of
 assert set(STAND_INS.values()) == {"", *ARTICLE}, "each set of the article has a stand-in"
 assert in_collection("richtmyer") == "Richtmyer-Meshkov" and in_collection("bonsai") is None
 assert [rate_of(name) for name in ("Richtmyer-Meshkov", "Skull", "", None)] == [1, 4, 4, 4]
+EOF
+PYTHONPATH=$top/tools /usr/bin/python3 -B - << 'EOF'
+from measuring.gpu_peers import SIDES, gpu_peers
+def row(name, device_bytes, **medians):
+    spreads = {kind: {"median": ms, "min": 0, "max": 9} for kind, ms in medians.items()}
+    others = {"missed": 0, "false": 1234, "distance_p99": 6e-5}
+    return {"volume": "shell_8x8x8", "name": name, "ms": spreads, "device_bytes": device_bytes,
+            "build_ms": 250, "max_voxel_error": 0.47, **others}
+pictures = {"cold_picture": 5, "next_picture": 4, "warm_picture": 30}
+ours = row("isowave_exact", 2**20, new=1.2, cold=1, next=0.8123, warm=0.6, **pictures)
+peer = row("nanovdb_fpn_bits", 2**21, kernel=0.5441, hits=0.6, picture=0.7, new=1.1)
+_, first, second = gpu_peers([ours, peer])
+end = ("0.25", "0.47", "0, 1,234", "6.0e-05")
+times = ("1.00 / 0.812 / 0.600", "5.00 / 4.00 / 30", "1.20")
+assert first == ("shell 8^3", SIDES["isowave_exact"], *times, "1 MiB", *end), first
+assert second[2:6] == ("0.544", "0.700", "1.10", "2 MiB"), second
 EOF
 for set in Skull 'TACC Turbulence' Kingsnake DNS Richtmyer-Meshkov; do
   [ "$(grep -c "^| $set |" "$work/top/page.md")" -eq 2 ] || fail "the article's $set is missing"

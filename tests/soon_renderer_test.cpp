@@ -55,9 +55,13 @@ class FakeRenderer : public Renderer {
     return {.eye = {rays_hit_, size.value().width, 0}};
   }
   ImageSize size() const override { return size_; }
-  Image8 shade(const Appearance &) override { return {}; }
   std::vector<HitRecord> hits() override { return {}; }
-  std::vector<float> depth() override { return {static_cast<float>(rays_hit_)}; }
+  FrameArrays fetch(const WantedArrays &, const Appearance &) override {
+    FrameArrays arrays;
+    arrays.depth = memory_.array<float>(1);
+    arrays.depth[0] = static_cast<float>(rays_hit_);
+    return arrays;
+  }
   void clear_cache() override {}
   std::uint64_t memory_bytes() const override { return 1000 + num_frames_; }
   double setup_ms() const override { return 3; }
@@ -68,6 +72,7 @@ class FakeRenderer : public Renderer {
   int &num_alive_;
   ImageSize size_;
   std::uint64_t num_frames_ = 0;
+  HostMemory memory_;
 };
 
 /// The renderer meanwhile hits 1 ray, the other one 2.

@@ -225,6 +225,36 @@ TEST_P(TimeBudgetOnDevice, BudgetIsKeptWhenPassesTakeWhatIsExpected) {
   }
 }
 
+/// The arrays are to be there in time, too: the last frame's tell how long they take.
+TEST_P(TimeBudgetOnDevice, TimeIsLeftForArrays) {
+  class SlowFetch : public RendererAround {
+   public:
+    SlowFetch(Renderer &inner, double &now, const double &fetch_ms)
+        : RendererAround(inner), now_(now), fetch_ms_(fetch_ms) {}
+    FrameArrays fetch(const WantedArrays &wanted, const Appearance &appearance) override {
+      now_ += fetch_ms_;
+      return RendererAround::fetch(wanted, appearance);
+    }
+
+   private:
+    double &now_;
+    const double &fetch_ms_;
+  };
+  double now = 0, fetch_ms = 2e6;
+  SlowFetch slow(renderer_, now, fetch_ms);
+  TimedRenderer frames(slow, [&now] { return now += 1; });
+  FrameRequest request{camera_, kIsovalue};
+  const auto num_steps = [&] { return frames.render(within_ms(1e6, request)).steps.size(); };
+  EXPECT_EQ(num_steps(), 2u);
+  frames.fetch({.depth = true}, {});
+  EXPECT_EQ(num_steps(), 1u) << "no time is left for a second one";
+  fetch_ms = 0;
+  request.on_pass = [&](const PassStats &) { return frames.depth().size() != 0; };
+  EXPECT_EQ(num_steps(), 1u) << "pictures of passes do not count";
+  frames.fetch({.depth = true}, {});
+  EXPECT_EQ(num_steps(), 2u);
+}
+
 /// With several rays a pixel, steps count rays; each but the last has one for each of its pixels.
 TEST_P(TimeBudgetOnDevice, SeveralRaysAPixel) {
   constexpr ImageSize kNine{9, 7, 3};

@@ -11,7 +11,6 @@
 #include "core/base/error.hpp"
 #include "core/base/parallel_for.hpp"
 #include "core/view/detail.hpp"
-#include "core/volume/world_positions.hpp"
 #include "core/zfp/isovalue.hpp"
 
 namespace isowave {
@@ -40,80 +39,11 @@ FrameStatistics public_statistics(const core::FrameStats &stats, std::uint64_t n
   result.uploaded_bytes = stats.uploaded_bytes;
   result.first_level = static_cast<std::uint32_t>(stats.first_level);
   result.last_level = static_cast<std::uint32_t>(stats.last_level);
-  result.total_ms = stats.total_ms;
+  result.total_ms = result.hits_ms = stats.total_ms;
   result.cancelled = stats.cancelled;
   result.complete = stats.complete;
   return result;
 }
-
-/// Finds the level of detail that a block id belongs to, and its place there.
-class HitCells {
- public:
-  HitCells(const core::CompressedVolume &volume, bool with_levels)
-      : grids_(core::make_level_grids(core::level_infos(volume, with_levels))) {}
-
-  Hit operator()(const core::HitRecord &record) const {
-    Hit hit;
-    hit.t = record.t;
-    if (std::isinf(record.t)) return hit;
-    const std::uint32_t columns = grids_[0].place.blocks_x, rows = grids_[0].place.blocks_y;
-    const std::uint32_t layer = record.block_id / columns / rows;
-    while (hit.level + 1 < grids_.size() && grids_[hit.level + 1].place.begin_z <= layer)
-      ++hit.level;
-    hit.cell = {4 * (record.block_id % columns) + record.cell % 4,
-                4 * (record.block_id / columns % rows) + record.cell / 4 % 4,
-                4 * (layer - grids_[hit.level].place.begin_z) + record.cell / 16};
-    hit.position = {record.x, record.y, record.z};
-    hit.gradient = {record.grad_x, record.grad_y, record.grad_z};
-    return hit;
-  }
-
- private:
-  std::vector<core::FrameParams> grids_;
-};
-
-/// World positions of hits.
-class HitPositions {
- public:
-  HitPositions(const core::CompressedVolume &volume, bool with_levels)
-      : cells_(volume, with_levels), to_world_(volume.info) {}
-
-  Vector3 operator()(const core::HitRecord &record) const {
-    if (std::isinf(record.t)) {
-      constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-      return {kNone, kNone, kNone};
-    }
-    const Hit hit = cells_(record);
-    const glm::dvec3 index = glm::dvec3(hit.cell[0], hit.cell[1], hit.cell[2]) +
-                             glm::dvec3(hit.position[0], hit.position[1], hit.position[2]);
-    // Voxel k of a level lies where voxel 2k of the finer one does.
-    return from_glm(to_world_(std::ldexp(1.0, static_cast<int>(hit.level)) * index));
-  }
-
- private:
-  HitCells cells_;
-  core::WorldPositions to_world_;
-};
-
-/// Away from larger values, of length 1.
-class WorldNormals {
- public:
-  explicit WorldNormals(const core::VolumeInfo &info)
-      : to_world_(glm::transpose(glm::inverse(info.index_to_world()))) {}
-
-  std::array<float, 3> operator()(const core::HitRecord &hit) const {
-    glm::dvec3 gradient(hit.grad_x, hit.grad_y, hit.grad_z);
-    const double largest =
-        std::max({std::abs(gradient.x), std::abs(gradient.y), std::abs(gradient.z)});
-    if (std::isinf(hit.t) || largest == 0) return {};
-    gradient = to_world_ * (gradient / largest);
-    const glm::vec3 normal(-gradient / glm::length(gradient));
-    return {normal.x, normal.y, normal.z};
-  }
-
- private:
-  glm::dmat3 to_world_;
-};
 
 }  // namespace
 
@@ -243,7 +173,7 @@ ImageSize ProgressInTurns::size() const {
   return current_size();
 }
 
-std::vector<std::uint8_t> ProgressInTurns::picture() const {
+Array<std::uint8_t> ProgressInTurns::picture() const {
   const auto lock = turn();
   return draw_picture();
 }
@@ -268,17 +198,29 @@ std::vector<core::WorldRay> world_rays(std::span<const Ray> rays) {
   return result;
 }
 
-void fill_frame(const FrameRequest &request, const std::vector<core::HitRecord> &records,
-                const core::CompressedVolume &volume, bool with_levels, Frame &frame) {
-  const auto to_each = [&](auto &out, const auto &make) {
-    out.resize(records.size());
-    core::parallel_for(records.size(), 0,
-                       [&](std::uint64_t i, std::uint32_t) { out[i] = make(records[i]); });
-  };
-  if (request.want_depth) frame.depth = core::depth_of(records);
-  if (request.want_normals) to_each(frame.normals, WorldNormals(volume.info));
-  if (request.want_positions) to_each(frame.positions, HitPositions(volume, with_levels));
-  if (request.want_hits) to_each(frame.hits, HitCells(volume, with_levels));
+void move_arrays(core::FrameArrays &&arrays, Frame &frame) {
+  frame.picture = public_array(std::move(arrays.picture));
+  frame.depth = public_array(std::move(arrays.depth));
+  frame.normals = public_array(std::move(arrays.normals));
+  frame.positions = public_array(std::move(arrays.positions));
+}
+
+Array<Hit> public_hits(std::span<const core::HitRecord> records,
+                       const core::CompressedVolume &volume, bool with_levels) {
+  const core::HitMap map = core::make_hit_map(core::level_infos(volume, with_levels));
+  core::HostMemory memory;
+  core::HostArray<Hit> hits = memory.array<Hit>(records.size());
+  core::fill_from_hits(hits, records, [&](const core::HitRecord &record) {
+    Hit hit{.t = record.t};
+    if (std::isinf(record.t)) return hit;
+    const core::HitCell cell = core::hit_cell(&map, record.block_id, record.cell);
+    hit.level = cell.level;
+    hit.cell = {cell.x, cell.y, cell.z};
+    hit.position = {record.x, record.y, record.z};
+    hit.gradient = {record.grad_x, record.grad_y, record.grad_z};
+    return hit;
+  });
+  return public_array(std::move(hits));
 }
 
 Frame frame_of_rays(const std::vector<core::HitRecord> &hits, const core::CompressedVolume &volume,
@@ -294,9 +236,13 @@ Frame frame_of_rays(const std::vector<core::HitRecord> &hits, const core::Compre
   Frame frame;
   frame.rows = 1;
   frame.columns = static_cast<std::uint32_t>(hits.size());
-  const FrameRequest wanted{
-      .want_depth = true, .want_normals = true, .want_positions = true, .want_hits = true};
-  fill_frame(wanted, hits, volume, with_levels, frame);
+  core::HostMemory memory;
+  core::FrameArrays arrays;
+  const core::HitMap map = core::make_hit_map(core::level_infos(volume, with_levels));
+  core::add_hit_arrays({.depth = true, .normals = true, .positions = true}, hits,
+                       core::make_shade_params(volume.info, {}), &map, memory, arrays);
+  move_arrays(std::move(arrays), frame);
+  frame.hits = public_hits(hits, volume, with_levels);
   return frame;
 }
 

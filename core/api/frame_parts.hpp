@@ -37,11 +37,11 @@ class ProgressInTurns : public Progress {
   std::uint32_t passes() const final;
   double completed_percent() const final;
   ImageSize size() const final;
-  std::vector<std::uint8_t> picture() const final;
+  Array<std::uint8_t> picture() const final;
 
  private:
   virtual ImageSize current_size() const = 0;
-  virtual std::vector<std::uint8_t> draw_picture() const = 0;
+  virtual Array<std::uint8_t> draw_picture() const = 0;
 
   std::unique_lock<std::mutex> turn() const;
   void set_open(bool is_open);
@@ -65,10 +65,17 @@ std::vector<core::WorldRay> world_rays(std::span<const Ray> rays);
 Frame frame_of_rays(const std::vector<core::HitRecord> &hits, const core::CompressedVolume &volume,
                     bool with_levels);
 
-/// Fills in the frame's depth, normals, positions and hits, as the request wants them.
-///
-/// with_levels  levels of detail may have drawn it
-void fill_frame(const FrameRequest &request, const std::vector<core::HitRecord> &records,
-                const core::CompressedVolume &volume, bool with_levels, Frame &frame);
+/// The same values, in the same memory.
+template <class T>
+Array<T> public_array(core::HostArray<T> &&values) {
+  const std::size_t size = values.size();
+  T *const data = values.data();
+  return {std::shared_ptr<T>(values.release(), data), size};
+}
+/// Moves arrays that were fetched into the frame.
+void move_arrays(core::FrameArrays &&arrays, Frame &frame);
+
+Array<Hit> public_hits(std::span<const core::HitRecord> records,
+                       const core::CompressedVolume &volume, bool with_levels);
 
 }  // namespace isowave

@@ -1,6 +1,6 @@
 #include "isowave/renderer.hpp"
 
-#include <cmath>
+#include <chrono>
 #include <mutex>
 #include <utility>
 
@@ -8,6 +8,7 @@
 #include "core/api/guarded.hpp"
 #include "core/api/renderer_implementation.hpp"
 #include "core/api/volume_implementation.hpp"
+#include "core/base/ms_since.hpp"
 #include "core/io/file_name.hpp"
 #include "core/zfp/isovalue.hpp"
 
@@ -28,8 +29,8 @@ class ProgressOf : public ProgressInTurns {
     const core::ImageSize size = renderer_.size();
     return {size.width, size.height, size.samples};
   }
-  std::vector<std::uint8_t> draw_picture() const override {
-    return renderer_.shade(appearance_).pixels;
+  Array<std::uint8_t> draw_picture() const override {
+    return public_array(renderer_.fetch({.picture = true}, appearance_).picture);
   }
 
   core::Renderer &renderer_;
@@ -70,6 +71,7 @@ Frame Renderer::Implementation::draw(const FrameRequest &request) {
   core::Team &team = renderer_->team();
   if (team.size() > 1) core::agree_on(team, "request", text_of(request));
   if (!ready_for(request)) wait();
+  const auto begin = std::chrono::steady_clock::now();
   check_wanted(request, renderer_->abilities());
   core::FrameRequest wanted = core_request(request, volume_);
   ProgressOf progress(*renderer_, core_appearance(request.appearance));
@@ -91,24 +93,24 @@ Frame Renderer::Implementation::draw(const FrameRequest &request) {
     if (team.rank() == 0) frame.detail = public_choice(*stats.detail);
   }
   fetch(request, frame);
+  frame.statistics.total_ms = core::ms_since(begin);
   frame.statistics.hits = renderer_->num_hits(stats);
   if (request.want_bounds) {  // last, since it draws frames of its own
-    const std::vector<float> depth = request.want_depth ? frame.depth : renderer_->depth();
+    const std::vector<float> depth =
+        request.want_depth ? frame.depth.to_vector() : renderer_->depth();
     last_.certificate = core::certify(*renderer_, volume_, wanted, depth);
-    frame.bounds = std::move(last_.certificate.bounds);
+    frame.bounds = Array<float>(last_.certificate.bounds);
   }
   return frame;
 }
 
 /// Gets what the request wants of the frame that was drawn, except bounds.
 void Renderer::Implementation::fetch(const FrameRequest &request, Frame &frame) {
-  if (request.want_picture)
-    frame.picture = renderer_->shade(core_appearance(request.appearance)).pixels;
-  if (request.want_normals || request.want_positions || request.want_hits) {
-    fill_frame(request, renderer_->hits(), volume_, renderer_->abilities().levels, frame);
-  } else if (request.want_depth) {
-    frame.depth = renderer_->depth();
-  }
+  const core::WantedArrays wanted{request.want_picture, request.want_depth, request.want_normals,
+                                  request.want_positions};
+  move_arrays(renderer_->fetch(wanted, core_appearance(request.appearance)), frame);
+  if (request.want_hits)
+    frame.hits = public_hits(renderer_->hits(), volume_, renderer_->abilities().levels);
 }
 
 Frame Renderer::Implementation::cast_rays(std::span<const Ray> rays, double isovalue,
@@ -213,7 +215,7 @@ namespace {
 core::Image8 image_of(const Frame &frame) {
   const std::size_t num_pixels = std::size_t(frame.size.width) * frame.size.height;
   const std::uint32_t channels = frame.picture.size() == 4 * num_pixels ? 4 : 3;
-  return {frame.size.width, frame.size.height, channels, frame.picture};
+  return {frame.size.width, frame.size.height, channels, frame.picture.to_vector()};
 }
 
 }  // namespace

@@ -49,8 +49,9 @@ void color_words(std::span<const std::uint32_t> colors, std::uint32_t place,
   });
 }
 
-std::size_t set_colors(std::span<const std::uint64_t> words, std::size_t begin, Image8 &image) {
-  std::uint8_t *to = image.pixels.data() + 3 * begin;
+std::size_t set_colors(std::span<const std::uint64_t> words, std::size_t begin,
+                       std::span<std::uint8_t> picture) {
+  std::uint8_t *to = picture.data() + 3 * begin;
   std::size_t num_hits = 0;
   for (const std::uint64_t word : words) {
     num_hits += word >> 32 != kNoPlace;
@@ -70,15 +71,15 @@ void color_halves(std::span<const std::uint32_t> colors, std::uint32_t place,
 }
 
 std::size_t set_half_colors(std::span<const std::uint64_t> words, std::size_t begin,
-                            Image8 &image) {
+                            std::span<std::uint8_t> picture) {
   static_assert(std::endian::native == std::endian::little);
   const auto hits_of = [](std::uint64_t word) {
     return std::size_t{word >> 56 != kNoHalfPlace} + ((word >> 24 & 0xFF) != kNoHalfPlace);
   };
-  std::uint8_t *to = image.pixels.data() + 3 * begin;
+  std::uint8_t *to = picture.data() + 3 * begin;
   std::size_t num_hits = 0;
   // Four pixels at once are 12 bytes, of which compilers make two stores.
-  const std::uint8_t *end = image.pixels.data() + image.pixels.size();
+  const std::uint8_t *end = picture.data() + picture.size();
   for (; words.size() >= 2 && end - to >= 12; words = words.subspan(2), to += 12) {
     const std::uint64_t head =
         (words[0] & kColor) | (words[0] >> 32 & kColor) << 24 | (words[1] & 0xFFFF) << 48;

@@ -10,7 +10,6 @@
 #include <span>
 #include <vector>
 
-#include "core/io/png.hpp"
 #include "kernels_cl/portable/shared_types.h"
 
 namespace isowave::core {
@@ -33,10 +32,12 @@ void set_field(std::span<const std::uint64_t> words, HitField field, std::span<H
 /// words [ray]: a brick's picture, of one ray a pixel, as DeviceRenderer::shade_packed() has it.
 void color_words(std::span<const std::uint32_t> colors, std::uint32_t place,
                  std::span<std::uint64_t> words);
-/// Gives an RGB picture's pixels from `begin` on the colours that won.
+/// Gives a picture's pixels from `begin` on the colours that won.
 ///
+/// picture  [pixels][3] RGB
 /// Returns  the number of pixels with a hit
-std::size_t set_colors(std::span<const std::uint64_t> words, std::size_t begin, Image8 &image);
+std::size_t set_colors(std::span<const std::uint64_t> words, std::size_t begin,
+                       std::span<std::uint8_t> picture);
 
 /// Most bricks for which half a word is enough.
 inline constexpr std::uint32_t kMostHalfWordBricks = 0xFF;
@@ -44,6 +45,7 @@ inline constexpr std::uint32_t kMostHalfWordBricks = 0xFF;
 void color_halves(std::span<const std::uint32_t> colors, std::uint32_t place,
                   std::span<std::uint64_t> words);
 /// As set_colors(). begin: even.
-std::size_t set_half_colors(std::span<const std::uint64_t> words, std::size_t begin, Image8 &image);
+std::size_t set_half_colors(std::span<const std::uint64_t> words, std::size_t begin,
+                            std::span<std::uint8_t> picture);
 
 }  // namespace isowave::core

@@ -201,7 +201,8 @@ void TeamRenderer::reduce(std::size_t count, Reduction how, Receiver who, const 
   composition_.bytes += count * sizeof(std::uint64_t);
 }
 
-void TeamRenderer::compose_colors(std::span<const std::uint32_t> colors, Image8 &image) {
+void TeamRenderer::compose_colors(std::span<const std::uint32_t> colors,
+                                  std::span<std::uint8_t> picture) {
   const bool in_halves = team_.size() <= kMostHalfWordBricks;
   const std::size_t per_word = in_halves ? 2 : 1;
   std::atomic<std::uint64_t> num_hits = 0;
@@ -214,7 +215,7 @@ void TeamRenderer::compose_colors(std::span<const std::uint32_t> colors, Image8 
            (in_halves ? color_halves : color_words)(own, place_, words);
          },
          [&](std::size_t begin, std::span<const std::uint64_t> words) {
-           num_hits += (in_halves ? set_half_colors : set_colors)(words, per_word * begin, image);
+           num_hits += (in_halves ? set_half_colors : set_colors)(words, per_word * begin, picture);
          });
   num_hits_ = num_hits;
 }
@@ -247,31 +248,44 @@ std::vector<HitRecord> TeamRenderer::compose_hits(std::span<const HitRecord> own
   return hits;
 }
 
-Image8 TeamRenderer::shade(const Appearance &appearance) {
+FrameArrays TeamRenderer::fetch(const WantedArrays &wanted, const Appearance &appearance) {
   const bool receives = team_.rank() == 0;
-  if (has_whole_) return receives ? renderer_.shade(appearance) : Image8{};
-  const ImageSize size = renderer_.size();
-  if (size.samples > 1) {
+  FrameArrays arrays;
+  if (wanted.picture) arrays.picture = compose_picture(appearance);
+  std::vector<HitRecord> hits;
+  if (wanted.normals) {
+    hits = this->hits();
+  } else if (wanted.depth) {
+    constexpr HitField kDepth[] = {HitField::kT};
+    hits = compose_hits(own_hits(), kDepth);
+  }
+  if (receives)
+    add_hit_arrays(wanted, hits, make_shade_params(brick_, appearance), nullptr, memory_, arrays);
+  return arrays;
+}
+
+/// On rank 0; empty on others.
+HostArray<std::uint8_t> TeamRenderer::compose_picture(const Appearance &appearance) {
+  const bool receives = team_.rank() == 0;
+  constexpr WantedArrays kPicture{.picture = true};
+  if (has_whole_)
+    return receives ? renderer_.fetch(kPicture, appearance).picture : HostArray<std::uint8_t>{};
+  if (renderer_.size().samples > 1) {
     // The mean of a pixel's colours is made of more than 8 bits of each.
     constexpr HitField kShaded[] = {HitField::kT, HitField::kGradX, HitField::kGradY,
                                     HitField::kGradZ};
     const std::vector<HitRecord> hits = compose_hits(own_hits(), kShaded);
     if (!receives) return {};
     renderer_.set_hits(hits);
-    Image8 image = renderer_.shade(appearance);
+    HostArray<std::uint8_t> picture = renderer_.fetch(kPicture, appearance).picture;
     renderer_.set_hits(own_hits());  // passes may follow
-    return image;
+    return picture;
   }
-  const std::vector<std::uint32_t> colors = renderer_.shade_packed(appearance);
-  Image8 image;
-  if (receives) image = {size.width, size.height, 3, std::vector<std::uint8_t>(3 * colors.size())};
-  compose_colors(colors, image);
-  return image;
-}
-
-std::vector<float> TeamRenderer::depth() {
-  constexpr HitField kDepth[] = {HitField::kT};
-  return depth_of(compose_hits(own_hits(), kDepth));
+  const HostArray<std::uint32_t> colors = renderer_.shade_packed(appearance);
+  HostArray<std::uint8_t> picture;
+  if (receives) picture = memory_.array<std::uint8_t>(3 * colors.size());
+  compose_colors({colors.data(), colors.size()}, {picture.data(), picture.size()});
+  return picture;
 }
 
 std::uint64_t TeamRenderer::num_hits(const FrameStats &) {

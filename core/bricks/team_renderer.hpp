@@ -62,8 +62,7 @@ class TeamRenderer : public Renderer {
 
   ImageSize size() const override { return renderer_.size(); }
   /// Puts together colours; with several rays a pixel it puts together hits, which rank 0 shades.
-  Image8 shade(const Appearance &appearance = {}) override;
-  std::vector<float> depth() override;
+  FrameArrays fetch(const WantedArrays &wanted, const Appearance &appearance) override;
   /// Hits without the ids of their blocks.
   std::vector<HitRecord> hits() override;
   /// Puts together the frame's depth, if nothing was put together yet.
@@ -86,8 +85,9 @@ class TeamRenderer : public Renderer {
   void add_ambient(const FrameRequest &request, FrameStats &stats);
   void reduce(std::size_t count, Reduction how, Receiver who, const MakeWords &make,
               const TakeWords &take);
-  /// image: black; at rank 0 only.
-  void compose_colors(std::span<const std::uint32_t> colors, Image8 &image);
+  HostArray<std::uint8_t> compose_picture(const Appearance &appearance);
+  /// picture [pixels][3]: at rank 0 only.
+  void compose_colors(std::span<const std::uint32_t> colors, std::span<std::uint8_t> picture);
   /// Puts together a word of each ray.
   void compose(Receiver who, const MakeWords &make, const TakeWords &take);
   /// The hits that win among all bricks'.
@@ -107,6 +107,7 @@ class TeamRenderer : public Renderer {
   bool has_whole_ = false;                 ///< the renderer has the hits of all bricks already
   std::optional<std::uint64_t> num_hits_;  ///< hits in what was put together last
   CompositionStats composition_;
+  HostMemory memory_;
 };
 
 }  // namespace isowave::core

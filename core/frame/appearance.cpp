@@ -16,16 +16,6 @@ void store_rows(const glm::dmat3 &m, float *rows) {
   }
 }
 
-Image8 rgb_image(std::uint32_t columns, std::uint32_t rows, const std::vector<uint> &packed) {
-  Image8 image{columns, rows, 3, {}};
-  image.pixels.reserve(3 * packed.size());
-  for (const uint rgba : packed) {
-    for (int shift = 0; shift < 24; shift += 8)
-      image.pixels.push_back(static_cast<std::uint8_t>(rgba >> shift));
-  }
-  return image;
-}
-
 ShadeParams make_shade_params(const VolumeInfo &info, const Appearance &appearance) {
   ShadeParams params{};
   const glm::dmat3 index_to_world = info.index_to_world();
@@ -48,11 +38,15 @@ Image8 shade_scalar(const FrameParams &frame, const ShadeParams &params,
                     const std::vector<HitRecord> &hits, std::uint32_t samples,
                     const OpenCounts &open) {
   const std::uint32_t columns = frame.view.width / samples, rows = frame.view.height / samples;
-  std::vector<uint> packed(std::size_t{columns} * rows);
-  for (uint pixel = 0; pixel < packed.size(); ++pixel)
-    packed[pixel] = shade_pixel(&frame, &params, samples, pixel % columns, pixel / columns,
-                                hits.data(), open.counts.data(), open.num_ambient);
-  return rgb_image(columns, rows, packed);
+  Image8 image{columns, rows, 3, std::vector<std::uint8_t>(std::size_t{3} * columns * rows)};
+  for (uint pixel = 0; pixel < columns * rows; ++pixel) {
+    const uint rgba = shade_pixel(&frame, &params, samples, pixel % columns, pixel / columns,
+                                  hits.data(), open.counts.data(), open.num_ambient);
+    for (uint channel = 0; channel < 3; ++channel)
+      image.pixels[std::size_t{3} * pixel + channel] =
+          static_cast<std::uint8_t>(rgba >> 8 * channel);
+  }
+  return image;
 }
 
 }  // namespace isowave::core

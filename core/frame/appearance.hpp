@@ -32,10 +32,6 @@ void store_rows(const glm::dmat3 &m, float *rows);
 
 ShadeParams make_shade_params(const VolumeInfo &info, const Appearance &appearance);
 
-/// packed   [rows * columns] red in bits 0..7, green in 8..15, blue in 16..23
-/// Returns  RGB
-Image8 rgb_image(std::uint32_t columns, std::uint32_t rows, const std::vector<uint> &packed);
-
 /// The picture of a frame, made on the host with the bits of a device's (kernels_cl/shade.cl).
 ///
 /// hits     [height * width] hits of the frame's rays

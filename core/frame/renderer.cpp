@@ -71,6 +71,11 @@ void check(const FrameRequest &request, const Abilities &abilities) {
        "by a renderer that was made with_time_budget");
 }
 
+Image8 Renderer::shade(const Appearance &appearance) {
+  const FrameArrays arrays = fetch({.picture = true}, appearance);
+  return arrays.picture.empty() ? Image8{} : image_of(size(), arrays.picture);
+}
+
 void Renderer::keep_picture() {
   throw std::logic_error("a renderer without Abilities::kept_picture keeps none");
 }

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "core/base/team.hpp"
-#include "core/frame/appearance.hpp"
+#include "core/frame/frame_arrays.hpp"
 #include "core/frame/frame_request.hpp"
 #include "core/frame/solvers.hpp"
 #include "core/view/given_rays.hpp"
@@ -85,12 +85,15 @@ class Renderer {
   // was drawn.
 
   virtual ImageSize size() const = 0;
+  /// The wanted arrays, in memory that may serve the next frame's once they are gone. Positions
+  /// need Abilities::cells.
+  virtual FrameArrays fetch(const WantedArrays &wanted, const Appearance &appearance) = 0;
   /// RGB [size.height][size.width], row 0 at the top.
-  virtual Image8 shade(const Appearance &appearance = {}) = 0;
+  Image8 shade(const Appearance &appearance = {});
+  /// Distances from the eye [world units], as hits().
+  std::vector<float> depth() { return fetch({.depth = true}, {}).depth.copy(); }
   /// [size.ray_rows()][size.ray_columns()], row 0 at the top.
   virtual std::vector<HitRecord> hits() = 0;
-  /// Distances from the eye [world units], as hits().
-  virtual std::vector<float> depth() { return depth_of(hits()); }
   /// Number of rays that hit, for the frame with those statistics.
   virtual std::uint64_t num_hits(const FrameStats &stats) { return stats.rays_hit; }
 
@@ -142,9 +145,10 @@ class RendererAround : public Renderer {
     return inner().camera(isovalues, size);
   }
   ImageSize size() const override { return inner().size(); }
-  Image8 shade(const Appearance &appearance = {}) override { return inner().shade(appearance); }
+  FrameArrays fetch(const WantedArrays &wanted, const Appearance &appearance) override {
+    return inner().fetch(wanted, appearance);
+  }
   std::vector<HitRecord> hits() override { return inner().hits(); }
-  std::vector<float> depth() override { return inner().depth(); }
   std::uint64_t num_hits(const FrameStats &stats) override { return inner().num_hits(stats); }
   void keep_picture() override { inner().keep_picture(); }
   void fill_from_kept() override { inner().fill_from_kept(); }

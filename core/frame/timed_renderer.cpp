@@ -57,7 +57,8 @@ FrameStats TimedRenderer::render(const FrameRequest &request) {
   if (!request.time_budget_ms) return inner().render(request);
   core::check(request, abilities());
   check_can_keep(request);
-  const double begin = now_ms(), end = begin + *request.time_budget_ms;
+  const double fetch_ms = fetch_ms_;
+  const double begin = now_ms(), end = begin + *request.time_budget_ms - fetch_ms;
   FrameStats sum;
   std::size_t step = kNumSteps - 1;
   for (double step_begin = begin;;) {
@@ -86,8 +87,16 @@ FrameStats TimedRenderer::render(const FrameRequest &request) {
     step_begin = now;
   }
   if (step != 0) enlarge_kept(request_of(request, 0));
+  fetch_ms_ = fetch_ms;  // on_pass may have fetched small pictures
   sum.total_ms = now_ms() - begin;
   return sum;
+}
+
+FrameArrays TimedRenderer::fetch(const WantedArrays &wanted, const Appearance &appearance) {
+  const double begin = now_ms();
+  FrameArrays arrays = inner().fetch(wanted, appearance);
+  fetch_ms_ = now_ms() - begin;
+  return arrays;
 }
 
 /// Draws a step; the first one to its end, the others until the time is over.

@@ -13,7 +13,8 @@ namespace isowave::core {
 /// Draws frames with a time budget by a renderer that can keep a picture, in steps: with 1/8, 1/4
 /// and 1/2 of the rays along each axis, then with all rays. Smaller pictures have one ray per
 /// pixel. If the renderer has levels of detail, smaller pictures use levels whose voxels are at
-/// most one of their pixels apart. Requests without a budget are handed on.
+/// most one of their pixels apart. A budget ends when the arrays that are fetched are in the host's
+/// memory, if those of the frame before were the same. Requests without a budget are handed on.
 class TimedRenderer : public RendererAround {
  public:
   using Clock = std::function<double()>;  ///< [ms]
@@ -43,6 +44,9 @@ class TimedRenderer : public RendererAround {
   /// Throws   Error: half of the picture is larger than the renderer can keep
   FrameStats render(const FrameRequest &request) override;
 
+  /// Takes its time, which the next frames leave for it.
+  FrameArrays fetch(const WantedArrays &wanted, const Appearance &appearance) override;
+
   static double steady_clock_ms();
 
  private:
@@ -67,6 +71,7 @@ class TimedRenderer : public RendererAround {
   Clock now_;
   /// Time of each step when it was drawn last [ms]; 0: unknown.
   std::array<double, kNumSteps> last_ms_{};
+  double fetch_ms_ = 0;  ///< time of the last fetch() after a frame
 };
 
 }  // namespace isowave::core

@@ -263,22 +263,21 @@ std::vector<HitRecord> HostRenderer::hits() {
   return hits_;
 }
 
-std::vector<float> HostRenderer::depth() {
-  check_has_picture();
-  return depth_of(hits_);
-}
-
-Image8 HostRenderer::shade(const Appearance &appearance) {
+FrameArrays HostRenderer::fetch(const WantedArrays &wanted, const Appearance &appearance) {
   check_has_picture();
   const ShadeParams params = make_shade_params(info_, appearance);
-  Image8 image{frame_.view.width / size_.samples, frame_.view.height / size_.samples, 3, {}};
-  image.pixels.resize(std::size_t{3} * image.width * image.height);
-  parallel_for(image.height, num_threads_, [&](std::uint64_t row, std::uint32_t) {
-    host_loops().shade(frame_, params, size_.samples, static_cast<uint>(row), hits_.data(),
-                       open_.counts.data(), open_.num_ambient,
-                       image.pixels.data() + 3 * image.width * row);
-  });
-  return image;
+  FrameArrays arrays;
+  if (wanted.picture) {
+    arrays.picture = memory_.array<std::uint8_t>(3 * size_.num_pixels());
+    parallel_for(size_.height, num_threads_, [&](std::uint64_t row, std::uint32_t) {
+      host_loops().shade(frame_, params, size_.samples, static_cast<uint>(row), hits_.data(),
+                         open_.counts.data(), open_.num_ambient,
+                         arrays.picture.data() + std::size_t{3} * size_.width * row);
+    });
+  }
+  const HitMap map = make_hit_map(levels());
+  add_hit_arrays(wanted, hits_, params, &map, memory_, arrays);
+  return arrays;
 }
 
 }  // namespace isowave::core

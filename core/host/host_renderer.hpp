@@ -49,10 +49,9 @@ class HostRenderer : public Renderer {
 
   ImageSize size() const override { return size_; }
   std::vector<HitRecord> hits() override;
-  std::vector<float> depth() override;
   /// Counts of open ambient rays of the last frame's hits.
   const OpenCounts &open() const { return open_; }
-  Image8 shade(const Appearance &appearance = {}) override;
+  FrameArrays fetch(const WantedArrays &wanted, const Appearance &appearance) override;
 
   void keep_picture() override;
   void fill_from_kept() override { show_kept(false); }
@@ -84,6 +83,7 @@ class HostRenderer : public Renderer {
   OpenCounts open_;
   std::vector<HitRecord> kept_;
   ImageSize kept_size_;
+  HostMemory memory_;
 };
 
 }  // namespace isowave::core

@@ -350,9 +350,10 @@ std::uint64_t MeshRenderer::num_hits(const FrameStats &) {
       std::ranges::count_if(hits(), [](const HitRecord &hit) { return std::isfinite(hit.t); }));
 }
 
-Image8 MeshRenderer::shade(const Appearance &appearance) {
+FrameArrays MeshRenderer::fetch(const WantedArrays &wanted, const Appearance &appearance) {
   if (!has_picture_) throw Error("there is no picture: no frame has been drawn");
-  return shade_(make_shade_params(volume_.info, appearance), blocks_.rays(), size_.samples);
+  return shade_(wanted, make_shade_params(volume_.info, appearance),
+                make_hit_map({&volume_.info, 1}), blocks_.rays(), size_.samples);
 }
 
 }  // namespace isowave::core

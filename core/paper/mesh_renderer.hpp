@@ -77,7 +77,7 @@ class MeshRenderer : public Renderer {
   const MeshFrameStats &last_frame() const { return last_; }
   ImageSize size() const override { return size_; }
   std::vector<HitRecord> hits() override;
-  Image8 shade(const Appearance &appearance = {}) override;
+  FrameArrays fetch(const WantedArrays &wanted, const Appearance &appearance) override;
   /// Counts the hits of the last frame, which render() does not do.
   std::uint64_t num_hits(const FrameStats &stats) override;
 

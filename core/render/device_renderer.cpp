@@ -141,6 +141,7 @@ DeviceRenderer::DeviceRenderer(ocl::Device &device, const CompressedVolume &volu
       normals_of_camera_(blocks_, rays_, smooth_normals_, RaySource::kCamera),
       normals_of_given_(blocks_, rays_, smooth_normals_, RaySource::kGiven),
       shade_(device, options_.size.num_rays()),
+      hit_map_(make_hit_map(infos_of(blocks_.levels))),
       passes_(device, rays_) {
   const MemoryPlan &plan = blocks_.plan;
   if (plan.limits.kept_rays != 0) kept_.emplace(device, plan.limits.kept_rays);
@@ -347,12 +348,13 @@ void DeviceRenderer::set_hits(std::span<const HitRecord> hits) {
   rays_.hits.write(hits);
 }
 
-Image8 DeviceRenderer::shade(const Appearance &appearance) {
+FrameArrays DeviceRenderer::fetch(const WantedArrays &wanted, const Appearance &appearance) {
   check_has_picture();
-  return shade_(make_shade_params(blocks_.levels[0].info, appearance), rays_, size_.samples);
+  return shade_(wanted, make_shade_params(blocks_.levels[0].info, appearance), hit_map_, rays_,
+                size_.samples);
 }
 
-std::vector<std::uint32_t> DeviceRenderer::shade_packed(const Appearance &appearance) {
+HostArray<std::uint32_t> DeviceRenderer::shade_packed(const Appearance &appearance) {
   check_has_picture();
   return shade_.packed(make_shade_params(blocks_.levels[0].info, appearance), rays_, size_.samples);
 }

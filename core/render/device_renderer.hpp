@@ -65,16 +65,16 @@ class DeviceRenderer : public Renderer {
                                    Normals normals) override;
 
   std::vector<HitRecord> hits() override;
-  /// Replaces the last frame's hits, which shade() shows.
+  /// Replaces the last frame's hits, which fetch() shows.
   ///
   /// hits    [size.ray_rows()][size.ray_columns()]
   /// Throws  Error: no frame was drawn
   /// Waits   yes
   void set_hits(std::span<const HitRecord> hits);
-  Image8 shade(const Appearance &appearance = {}) override;
+  FrameArrays fetch(const WantedArrays &wanted, const Appearance &appearance) override;
   /// The picture of the hit buffer, RGBA in words, red in bits 0..7; A is 0 if no ray of a pixel
   /// hits.
-  std::vector<std::uint32_t> shade_packed(const Appearance &appearance);
+  HostArray<std::uint32_t> shade_packed(const Appearance &appearance);
   /// Counts of open ambient rays of the last frame's hits, for its finished rounds.
   ///
   /// Throws  Error: no frame was drawn
@@ -101,7 +101,7 @@ class DeviceRenderer : public Renderer {
   /// Waits    yes
   std::vector<std::uint64_t> blocked_rays(std::uint32_t round, std::uint32_t num_rounds,
                                           LaterPasses &stats);
-  /// Sets the counts that shade() uses instead of open(). Waits.
+  /// Sets the counts that pictures have instead of open(). Waits.
   void set_open(const OpenCounts &open);
 
   /// These three throw Error without options().with_kept_picture.
@@ -164,6 +164,7 @@ class DeviceRenderer : public Renderer {
   SmoothNormals smooth_normals_;
   SmoothNormalsWave normals_of_camera_, normals_of_given_;
   Shade shade_;
+  HitMap hit_map_;
   std::optional<KeptPicture> kept_;
   std::optional<RaysWave> given_rays_;  ///< this and the next two: options_.with_given_rays
   std::optional<Ambient> ambient_;

@@ -1,40 +1,114 @@
 #include "core/stages/shade.hpp"
 
+#include <algorithm>
+#include <span>
+#include <vector>
+
+#include "core/ocl/in_flight.hpp"
+#include "core/ocl/pinned_memory.hpp"
+
 namespace isowave::core {
 
+namespace {
+
+constexpr std::uint64_t kPixelsOfItem = 4;  // see shade.cl
+
+std::uint64_t num_items(std::uint64_t num_pixels) {
+  return (num_pixels + kPixelsOfItem - 1) / kPixelsOfItem;
+}
+
+}  // namespace
+
 ocl::BufferSizes Shade::sizes(std::uint64_t max_pixels) {
-  return {ocl::buffer_size<ShadeParams>("shading", 1),
-          ocl::buffer_size<uint>("framebuffer", max_pixels)};
+  // At least one position.
+  const std::uint64_t bytes = std::max<std::uint64_t>(num_items(max_pixels) * 4 * sizeof(uint), 24);
+  return {ocl::buffer_size<std::byte>("framebuffer", bytes)};
 }
 
 Shade::Shade(ocl::Device &device, std::uint64_t max_pixels)
     : device_(device),
-      params_(device, sizes(max_pixels)["shading"]),
-      image_(device, sizes(max_pixels)["framebuffer"]),
-      kernel_(device) {}
+      staging_(device, sizes(max_pixels)["framebuffer"]),
+      shade_(device),
+      depths_(device),
+      normals_(device),
+      positions_(device),
+      memory_(ocl::pin_for(device)) {}
 
 void Shade::compile(Wavefront &rays) {
   for (const std::size_t num_pixels :
-       {std::size_t{1}, image_.size()}) {  // PoCL compiles large ones anew
-    kernel_(ocl::Range::strided(num_pixels, ocl::kGroupSize, device_), FrameParams{}, params_, 1,
-            rays.hits, rays.open_counts, 0u, image_);
+       {std::size_t{1}, staging_.size() / sizeof(uint)}) {  // PoCL compiles large ones anew
+    const auto range = [&](std::size_t items) {
+      return ocl::Range::strided(items, ocl::kGroupSize, device_);
+    };
+    shade_(range(num_items(num_pixels)), FrameParams{}, ShadeParams{}, 1, rays.hits,
+           rays.open_counts, 0u, 0u, staging_);
+    depths_(range(num_pixels), 0u, 0u, rays.hits, staging_);
+    normals_(range(num_pixels / 3 + 1), ShadeParams{}, 0u, 0u, rays.hits, staging_);
   }
 }
 
-Image8 Shade::operator()(const ShadeParams &params, Wavefront &rays, std::uint32_t samples) {
-  return rgb_image(rays.frame.view.width / samples, rays.frame.view.height / samples,
-                   packed(params, rays, samples));
+/// Enqueues the picture and its copy: RGBA if the image has words, else RGB.
+template <class T>
+void Shade::shade(const ShadeParams &params, Wavefront &rays, std::uint32_t samples,
+                  HostArray<T> &image) {
+  constexpr bool kWithAlpha = sizeof(T) == sizeof(uint);
+  const std::size_t num_pixels =
+      std::size_t{rays.frame.view.width / samples} * (rays.frame.view.height / samples);
+  image = memory_.array<T>(kWithAlpha ? num_pixels : 3 * num_pixels);
+  shade_(ocl::Range::strided(num_items(num_pixels), ocl::kGroupSize, device_), rays.frame, params,
+         samples, rays.hits, rays.open_counts, rays.num_ambient, kWithAlpha ? 1u : 0u, staging_);
+  staging_.read_async(std::as_writable_bytes(std::span(image.data(), image.size())), copied_);
 }
 
-std::vector<uint> Shade::packed(const ShadeParams &params, Wavefront &rays, std::uint32_t samples) {
-  const std::uint32_t columns = rays.frame.view.width / samples,
-                      rows = rays.frame.view.height / samples;
-  std::vector<uint> colors(std::size_t{columns} * rows);
-  params_.write({&params, 1});
-  kernel_(ocl::Range::strided(colors.size(), ocl::kGroupSize, device_), rays.frame, params_,
-          samples, rays.hits, rays.open_counts, rays.num_ambient, image_);
-  image_.read(colors);
-  return colors;
+/// Enqueues launch(range, begin, count) for as many rays at a time as staging_ holds, each followed
+/// by its copy.
+template <class T, class Launch>
+void Shade::copy_parts(HostArray<T> &values, std::size_t num_rays, const Launch &launch) {
+  values = memory_.array<T>(num_rays);
+  const std::size_t most = staging_.size() / sizeof(T);
+  for (std::size_t begin = 0; begin < num_rays; begin += most) {
+    const std::size_t count = std::min(most, num_rays - begin);
+    launch(ocl::Range::strided(count, ocl::kGroupSize, device_), static_cast<uint>(begin),
+           static_cast<uint>(count));
+    staging_.read_async(std::as_writable_bytes(std::span(values.data() + begin, count)), copied_);
+  }
+}
+
+FrameArrays Shade::operator()(const WantedArrays &wanted, const ShadeParams &params,
+                              const HitMap &map, Wavefront &rays, std::uint32_t samples) {
+  const std::size_t num_rays = std::size_t{rays.frame.view.width} * rays.frame.view.height;
+  ocl::InFlight<FrameArrays> arrays(device_);
+  if (wanted.picture) shade(params, rays, samples, arrays->picture);
+  if (wanted.depth) {
+    copy_parts(arrays->depth, num_rays, [&](const ocl::Range &range, uint begin, uint count) {
+      depths_(range, begin, count, rays.hits, staging_);
+    });
+  }
+  if (wanted.normals) {
+    copy_parts(arrays->normals, num_rays, [&](const ocl::Range &range, uint begin, uint count) {
+      normals_(range, params, begin, count, rays.hits, staging_);
+    });
+  }
+  const bool has_doubles = device_.capabilities().fp64;
+  if (wanted.positions && has_doubles) {
+    copy_parts(arrays->positions, num_rays, [&](const ocl::Range &range, uint begin, uint count) {
+      positions_(range, map, begin, count, rays.hits, staging_);
+    });
+  }
+  if (copied_() != nullptr) copied_.wait();
+  if (wanted.positions && !has_doubles) {
+    std::vector<HitRecord> hits(num_rays);
+    rays.hits.read(hits);
+    add_hit_arrays({.positions = true}, hits, params, &map, memory_, *arrays);
+  }
+  return std::move(*arrays);
+}
+
+HostArray<uint> Shade::packed(const ShadeParams &params, Wavefront &rays, std::uint32_t samples) {
+  ocl::InFlight<HostArray<uint>> colors(device_);
+  shade(params, rays, samples, *colors);
+  copied_.wait();
+  return std::move(*colors);
 }
 
 }  // namespace isowave::core

@@ -1,11 +1,12 @@
 #pragma once
-// Hit buffer -> framebuffer (core/frame/appearance.hpp, kernels_cl/shade.cl).
+// Hit buffer -> arrays in host memory: picture, depth, normals, positions
+// (core/frame/frame_arrays.hpp, kernels_cl/shade.cl).
 
 #include <cstdint>
-#include <vector>
 
-#include "core/frame/appearance.hpp"
+#include "core/frame/frame_arrays.hpp"
 #include "core/stages/wavefront.hpp"
+#include "kernels/hit_positions.hpp"
 #include "kernels/shade.hpp"
 
 namespace isowave::core {
@@ -16,23 +17,38 @@ class Shade {
   static ocl::BufferSizes sizes(std::uint64_t max_pixels);
   Shade(ocl::Device &device, std::uint64_t max_pixels);
 
-  /// Launches the kernel without a pixel to shade, see Device::Compiling.
+  /// Launches the kernels without a pixel to shade, see Device::Compiling. Positions' kernel is
+  /// compiled when they are first wanted.
   void compile(Wavefront &rays);
 
-  /// Shades rays.hits, with the ambient light that rays.open_counts lets through.
+  /// The arrays of rays.hits; pictures with the ambient light that rays.open_counts lets through.
   ///
   /// samples  rays a pixel along each axis
-  /// Returns  RGB
-  /// Waits    yes
-  Image8 operator()(const ShadeParams &params, Wavefront &rays, std::uint32_t samples = 1);
-  /// The same as the kernel writes it: RGBA, red in bits 0..7, A 0 if no ray of a pixel hits.
-  std::vector<uint> packed(const ShadeParams &params, Wavefront &rays, std::uint32_t samples);
+  /// map      for positions
+  /// Waits    once
+  FrameArrays operator()(const WantedArrays &wanted, const ShadeParams &params, const HitMap &map,
+                         Wavefront &rays, std::uint32_t samples);
+  /// The picture as RGBA, red in bits 0..7, A 0 if no ray of a pixel hits.
+  ///
+  /// Waits  yes
+  HostArray<uint> packed(const ShadeParams &params, Wavefront &rays, std::uint32_t samples);
 
  private:
+  template <class T>
+  void shade(const ShadeParams &params, Wavefront &rays, std::uint32_t samples,
+             HostArray<T> &image);
+  template <class T, class Launch>
+  void copy_parts(HostArray<T> &values, std::size_t num_rays, const Launch &launch);
+
   ocl::Device &device_;
-  ocl::Buffer<ShadeParams> params_;
-  ocl::Buffer<uint> image_;
-  ocl::Kernel<kernels::shade> kernel_;
+  /// The picture, or parts of other arrays, on their way to the host.
+  ocl::Buffer<std::byte> staging_;
+  ocl::Kernel<kernels::shade> shade_;
+  ocl::Kernel<kernels::hit_depths> depths_;
+  ocl::Kernel<kernels::hit_normals> normals_;
+  ocl::Kernel<kernels::hit_positions> positions_;  ///< for devices with doubles
+  HostMemory memory_;
+  cl::Event copied_;  ///< the end of the last copy to the host
 };
 
 }  // namespace isowave::core

@@ -23,22 +23,26 @@ bool float32_holds_positions(const VolumeInfo &info) {
 }
 
 glm::dvec3 rounded_to_float32(const glm::dvec3 &position) {
-  // GCC 12 leaves out both conversions, to float32 and back, if it makes vectors of them.
-  const auto rounded = [](double value) {
-    const volatile float result = static_cast<float>(value);
-    return double{result};
-  };
-  return {rounded(position.x), rounded(position.y), rounded(position.z)};
+  return {rounded_to_float(position.x), rounded_to_float(position.y), rounded_to_float(position.z)};
+}
+
+WorldMap make_world_map(const VolumeInfo &info) {
+  WorldMap map{};
+  const glm::dmat3 to_world = info.index_to_world();
+  for (int row = 0; row < 3; ++row) {
+    map.origin[row] = info.origin[row];
+    for (int axis = 0; axis < 3; ++axis) map.to_world[3 * row + axis] = to_world[axis][row];
+  }
+  return map;
 }
 
 WorldPositions::WorldPositions(const VolumeInfo &info)
-    : origin_(info.origin),
-      to_world_(info.index_to_world()),
-      is_float32_(float32_holds_positions(info)) {}
+    : map_(make_world_map(info)), is_float32_(float32_holds_positions(info) ? 1 : 0) {}
 
 glm::dvec3 WorldPositions::operator()(const glm::dvec3 &index) const {
-  const glm::dvec3 position = origin_ + to_world_ * index;
-  return is_float32_ ? rounded_to_float32(position) : position;
+  glm::dvec3 position;
+  world_position(&map_, is_float32_, index.x, index.y, index.z, &position.x);
+  return position;
 }
 
 }  // namespace isowave::core

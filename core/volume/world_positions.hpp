@@ -4,6 +4,7 @@
 #include <glm/glm.hpp>
 
 #include "core/volume/volume.hpp"
+#include "kernels_cl/portable/world_position.h"
 
 namespace isowave::core {
 
@@ -17,6 +18,9 @@ bool float32_holds_positions(const VolumeInfo &info);
 /// Each coordinate's float32.
 glm::dvec3 rounded_to_float32(const glm::dvec3 &position);
 
+/// From index space to the world, as kernels have it.
+WorldMap make_world_map(const VolumeInfo &info);
+
 /// From index space to the world.
 class WorldPositions {
  public:
@@ -26,9 +30,8 @@ class WorldPositions {
   glm::dvec3 operator()(const glm::dvec3 &index) const;
 
  private:
-  glm::dvec3 origin_;
-  glm::dmat3 to_world_;
-  bool is_float32_;
+  WorldMap map_;
+  uint is_float32_;
 };
 
 }  // namespace isowave::core

@@ -8,7 +8,7 @@
 #ifndef ISOWAVE_SHADE_H
 #define ISOWAVE_SHADE_H
 
-#include "cell_intersect.h"
+#include "ambient.h"
 
 ISO_NAMESPACE_BEGIN
 
@@ -49,15 +49,26 @@ ISO_INLINE uint to_byte(float c) {
   return (uint)fma(c, 255.0f, 0.5f);
 }
 
+ISO_INLINE uint pixel_of(float r, float g, float b, uint alpha) {
+  return to_byte(r) | to_byte(g) << 8 | to_byte(b) << 16 | alpha << 24;
+}
+
+/// A pixel whose rays hit nothing.
+ISO_INLINE uint background_pixel(const ShadeParams *p) {
+  const Color color = make_color(p->background_r, p->background_g, p->background_b);
+  return pixel_of(color.r, color.g, color.b, 0);
+}
+
 /// The color of a ray. open: the share of the sky that its hit sees, [0,1]; the same share of all
 /// lights but the headlight's gets there.
-ISO_INLINE Color shade_ray(const FrameParams *frame, ISO_CONSTANT const ShadeParams *p, uint ray_id,
-                           float t, float gx, float gy, float gz, float open) {
-  const Ray ray = make_ray(frame, ray_id);
+ISO_INLINE Color shade_ray(const FrameParams *frame, const ShadeParams *p, uint ray_id, float t,
+                           float gx, float gy, float gz, float open) {
+  Ray ray;
   float nx, ny, nz, vx, vy, vz, ux, uy, uz, n, lengths, cosine, facing, slope, highlight, light;
   float largest = fabs(gx) > fabs(gy) ? fabs(gx) : fabs(gy);
   int i;
   if (t == INFINITY) return make_color(p->background_r, p->background_g, p->background_b);
+  ray = make_ray(frame, ray_id);
   largest = fabs(gz) > largest ? fabs(gz) : largest;
   if (largest >
       0.0f) { /* only its direction counts: squares of huge or tiny values would not survive */
@@ -101,15 +112,16 @@ ISO_INLINE Color shade_ray(const FrameParams *frame, ISO_CONSTANT const ShadePar
 ///
 /// open_counts  [ray] ambient rays of its hit that met nothing (ambient.h)
 /// num_ambient  ambient rays of a hit; 0: there are none, and all is open
-ISO_INLINE uint shade_pixel(const FrameParams *frame, ISO_CONSTANT const ShadeParams *p,
-                            uint samples, uint column, uint row, ISO_GLOBAL const HitRecord *hits,
+ISO_INLINE uint shade_pixel(const FrameParams *frame, const ShadeParams *p, uint samples,
+                            uint column, uint row, ISO_GLOBAL const HitRecord *hits,
                             ISO_GLOBAL const uchar *open_counts, uint num_ambient) {
   const float share = 1.0f / (float)(samples * samples);
+  const uint first_ray = row * samples * frame->view.width + column * samples;
   float r = 0.0f, g = 0.0f, b = 0.0f;
   uint i, a = 0;
+  if (samples == 1 && hits[first_ray].t == INFINITY) return background_pixel(p);
   for (i = 0; i < samples * samples; ++i) { /* in one order on every device */
-    const uint ray_id =
-        (row * samples + i / samples) * frame->view.width + column * samples + i % samples;
+    const uint ray_id = first_ray + i / samples * frame->view.width + i % samples;
     const Color color =
         shade_ray(frame, p, ray_id, hits[ray_id].t, hits[ray_id].grad_x, hits[ray_id].grad_y,
                   hits[ray_id].grad_z,
@@ -119,7 +131,22 @@ ISO_INLINE uint shade_pixel(const FrameParams *frame, ISO_CONSTANT const ShadePa
     b += color.b;
     if (hits[ray_id].t != INFINITY) a = 255;
   }
-  return to_byte(r * share) | to_byte(g * share) << 8 | to_byte(b * share) << 16 | a << 24;
+  return pixel_of(r * share, g * share, b * share, a);
+}
+
+/// The normal of a hit in world space, of length 1, away from larger values; 0 if there is no hit,
+/// or no gradient.
+ISO_INLINE AmbientDirection world_normal(const ShadeParams *p, HitRecord hit) {
+  AmbientDirection normal;
+  normal.x = hit.t == INFINITY ? 0.0f : hit.grad_x;
+  normal.y = hit.t == INFINITY ? 0.0f : hit.grad_y;
+  normal.z = hit.t == INFINITY ? 0.0f : hit.grad_z;
+  normal = normalized(normal);
+  normal = normalized(turned(p->normal, normal.x, normal.y, normal.z));
+  normal.x = 0.0f - normal.x; /* never -0 */
+  normal.y = 0.0f - normal.y;
+  normal.z = 0.0f - normal.z;
+  return normal;
 }
 
 ISO_NAMESPACE_END

@@ -148,13 +148,13 @@ struct FrameOfMany {
     return frame_path(name, drawing.cameras.size(), options, isovalue, view);
   }
   isowave::FrameRequest request() const;
-  void write_outputs(Frame &frame) const;
+  void write_outputs(const Frame &frame) const;
   void report_error(const Frame &frame, ordered_json &entry) const;
   void write_refined(isowave::FrameRequest request) const;
 };
 
-Image8 image_of(const isowave::ImageSize &size, std::vector<std::uint8_t> picture) {
-  return {size.width, size.height, 3, std::move(picture)};
+Image8 image_of(const isowave::ImageSize &size, const isowave::Array<std::uint8_t> &picture) {
+  return {size.width, size.height, 3, picture.to_vector()};
 }
 
 /// With --progress-dir, the picture after every pass is written.
@@ -186,13 +186,12 @@ isowave::FrameRequest FrameOfMany::request() const {
 }
 
 /// All ranks: rank 0 writes what it has got.
-void FrameOfMany::write_outputs(Frame &frame) const {
+void FrameOfMany::write_outputs(const Frame &frame) const {
   together(drawing.team, [&] {
     if (drawing.team.rank() != 0) return;
-    if (!options.image.empty())
-      write_png(image_of(frame.size, std::move(frame.picture)), path(options.image));
+    if (!options.image.empty()) write_png(image_of(frame.size, frame.picture), path(options.image));
     if (!options.depth.empty())
-      write_npy({frame.columns, frame.rows, std::move(frame.depth)}, path(options.depth));
+      write_npy({frame.columns, frame.rows, frame.depth.to_vector()}, path(options.depth));
   });
 }
 
@@ -210,10 +209,10 @@ void FrameOfMany::write_refined(isowave::FrameRequest request) const {
   request.time_budget_ms.reset();
   request.want_picture = true;
   request.want_depth = false;
-  Frame refined = drawing.renderer->render(request);
+  const Frame refined = drawing.renderer->render(request);
   together(drawing.team, [&] {
     if (drawing.team.rank() == 0)
-      write_png(image_of(refined.size, std::move(refined.picture)), path(options.refined));
+      write_png(image_of(refined.size, refined.picture), path(options.refined));
   });
   fmt::print("  refined: {} rays hit, {:.1f} ms more\n", with_commas(refined.statistics.hits),
              refined.statistics.total_ms);
@@ -229,7 +228,7 @@ ordered_json draw_frame(const FrameOfMany &frame, ordered_json &own) {
   const auto begin = std::chrono::steady_clock::now();
   const double composed_before = drawing.is_team() ? drawing.of_team->composition().ms : 0;
   const isowave::FrameRequest request = frame.request();
-  Frame drawn = drawing.renderer->render(request);
+  const Frame drawn = drawing.renderer->render(request);
   frame.write_outputs(drawn);
   const std::uint64_t num_hits = drawn.statistics.hits;
   const LastFrame &last = drawing.renderer->last();
@@ -246,7 +245,9 @@ ordered_json draw_frame(const FrameOfMany &frame, ordered_json &own) {
              {"composition_ms", drawing.of_team->composition().ms - composed_before}};
   } else {
     fmt::print("isovalue {}, view {}: {} rays hit, {} passes, {:.1f} ms\n", frame.isovalue,
-               frame.view, with_commas(num_hits), last.stats.passes.size(), last.stats.total_ms);
+               frame.view, with_commas(num_hits), last.stats.passes.size(),
+               drawn.statistics.total_ms);
+    entry["total_ms"] = drawn.statistics.total_ms;
   }
   warn_of_isovalue(drawing.volume(), frame.isovalue);
   if (options.max_surface_error) frame.report_error(drawn, entry);

@@ -305,9 +305,11 @@ def paper_blocks(rows):
             bounded(row),
         )
         active = [
-            "refused"
-            if m.get("refused")
-            else both(m["active_blocks"]["mean"], m["active_blocks"]["max"])
+            (
+                "refused"
+                if m.get("refused")
+                else both(m["active_blocks"]["mean"], m["active_blocks"]["max"])
+            )
             for m in (rays, blocks, mesh)
         ]
         tight = 3 * ["refused"]

@@ -1,6 +1,6 @@
 """The sections that tools/measure knows: name -> function, and what each needs."""
 
-from measuring import accuracy, bricks, paper, speed
+from measuring import accuracy, bricks, gpu_peers, paper, speed
 from measuring.run import AS_CPU
 
 SECTIONS = {
@@ -22,6 +22,7 @@ SECTIONS = {
         accuracy.stability,
         speed.cpus,
         speed.peer,
+        gpu_peers.gpu_peer,
         paper.paper,
         paper.devices,
         bricks.bricks,
@@ -35,6 +36,11 @@ SECTIONS = {
     )
 }
 NEED_VOLUMES = ("bits", "oracles", "certified", "sizes", "detail", "solvers", "pareto")
-# What some need beside isowave, frame_bench and isowave_bench: built only with VTK, with MPI, or
-# with tests.
-PROGRAMS = {"peer": "bench/peer_bench", "bricks": "bench/brick_bench", "cpus": AS_CPU}
+# What some need beside isowave, frame_bench and isowave_bench: built only with VTK, with CUDA, with
+# MPI, or with tests.
+PROGRAMS = {
+    "peer": "bench/peer_bench",
+    "gpu_peer": "bench/gpu_peer",
+    "bricks": "bench/brick_bench",
+    "cpus": AS_CPU,
+}

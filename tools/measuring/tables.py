@@ -4,7 +4,7 @@ its own, the head first."""
 import pathlib
 import statistics
 
-from measuring import bricks, paper_article, paper_tables
+from measuring import bricks, gpu_peers, paper_article, paper_tables
 from measuring.cells import mebibytes, ms, name_of, percent
 
 
@@ -15,19 +15,26 @@ def option(row, name):
 
 
 def thrice(row):
-    return [ms(row[kind]["median"]) for kind in ("cold", "next", "warm")]
+    """Times until the picture is in the host's memory; in brackets, until hits are on the device.
+    Rows of old measurements have the latter alone, without brackets."""
+
+    def cell(kind):
+        picture = ms(row[kind]["median"])
+        return f"{picture} ({ms(row['hits'][kind])})" if "hits" in row else picture
+
+    return [cell(kind) for kind in ("cold", "next", "warm")]
 
 
 def frames(rows):
-    times = ("cold ms", "next", "warm", "floor")
+    times = ("cold ms", "next", "warm", "cold, of all views", "floor")
     yield "volume", "pipeline", *times, "blocks decoded", "device memory"
     for row in rows:
         cold = row["cold"]
         yield (
             name_of(row["volume"]),
             option(row, "--pipeline"),
-            f"{ms(cold['median'])} ({ms(cold['min'])} to {ms(cold['max'])})",
-            *thrice(row)[1:],
+            *thrice(row),
+            f"{ms(cold['min'])} to {ms(cold['max'])}",
             ms(row["floor"]) if row["floor"] else "",
             f"{row['decoded_blocks']:,.0f}",
             mebibytes(row["memory"]),
@@ -460,6 +467,7 @@ TABLES = {
         ("stability", stability, leaks),
         ("cpus", cpus),
         ("peer", peer),
+        ("gpu_peer", gpu_peers.gpu_peers),
         ("paper", *paper_article.TABLES, *paper_tables.TABLES),
         ("devices", paper_tables.by_device),
         ("bricks", bricks.in_bricks),

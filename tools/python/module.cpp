@@ -15,7 +15,7 @@ isowave::Frame frame_of(const Picture &picture) {
   isowave::Frame frame;
   frame.size = {static_cast<std::uint32_t>(picture.shape(1)),
                 static_cast<std::uint32_t>(picture.shape(0)), 1};
-  frame.picture.assign(picture.data(), picture.data() + picture.size());
+  frame.picture = isowave::Array<std::uint8_t>(std::span(picture.data(), picture.size()));
   return frame;
 }
 

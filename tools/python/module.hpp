@@ -49,14 +49,15 @@ using isowave::Vector3;
 using Index3 = std::array<std::uint32_t, 3>;
 using Color = std::array<float, 3>;
 
-/// A numpy array that owns the vector's values. T may be an array of numbers: then `shape` has its
-/// length, too.
-template <class Number, class T>
-nb::object to_numpy(std::vector<T> &&values, std::initializer_list<std::size_t> shape) {
-  auto owned = std::make_unique<std::vector<T>>(std::move(values));
+/// A numpy array that owns the values, std::vector or isowave::Array. These may be arrays of
+/// numbers: then `shape` has their length, too.
+template <class Number, class Values>
+nb::object to_numpy(Values &&values, std::initializer_list<std::size_t> shape) {
+  static_assert(std::is_rvalue_reference_v<decltype(values)>);
+  auto owned = std::make_unique<Values>(std::move(values));
   auto *data = reinterpret_cast<Number *>(owned->data());
   const nb::capsule owner(owned.release(),
-                          [](void *held) noexcept { delete static_cast<std::vector<T> *>(held); });
+                          [](void *held) noexcept { delete static_cast<Values *>(held); });
   return nb::cast(nb::ndarray<nb::numpy, Number>(data, shape, owner));
 }
 

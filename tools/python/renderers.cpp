@@ -52,7 +52,7 @@ class PassView {
   }
   nb::object picture() const {
     isowave::ImageSize size;
-    std::vector<std::uint8_t> pixels = look([&](const isowave::Progress &progress) {
+    isowave::Array<std::uint8_t> pixels = look([&](const isowave::Progress &progress) {
       size = progress.size();
       return progress.picture();
     });
@@ -85,6 +85,7 @@ nb::dict statistics_dict(const isowave::FrameStatistics &statistics) {
   result["first_level"] = statistics.first_level;
   result["last_level"] = statistics.last_level;
   result["total_ms"] = statistics.total_ms;
+  result["hits_ms"] = statistics.hits_ms;
   result["cancelled"] = statistics.cancelled;
   result["complete"] = statistics.complete;
   result["errors_are_stated"] = statistics.errors_are_stated;

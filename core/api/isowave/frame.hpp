@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "isowave/array.hpp"
 #include "isowave/camera.hpp"
 
 namespace isowave {
@@ -51,8 +52,8 @@ class Progress {
   /// Size of picture(): the frame's, except that the first pictures within a time budget are
   /// smaller.
   virtual ImageSize size() const = 0;
-  /// RGB [height][width][3], row 0 at the top. Takes a few milliseconds.
-  virtual std::vector<std::uint8_t> picture() const = 0;
+  /// RGB [height][width][3], row 0 at the top.
+  virtual Array<std::uint8_t> picture() const = 0;
 };
 
 /// One frame: what to draw, how precisely, and which arrays to return. Rendering the same request
@@ -150,7 +151,8 @@ struct FrameStatistics {
   double ambient_ms = 0;                          ///< part of total_ms
   std::uint64_t uploaded_bytes = 0;               ///< from a compressed volume on the host
   std::uint32_t first_level = 0, last_level = 0;  ///< levels of detail that drew; 0: the finest
-  double total_ms = 0;     ///< wall clock, from camera to finished hits on the device
+  double total_ms = 0;     ///< wall clock, from camera to the wanted arrays in the host's memory
+  double hits_ms = 0;      ///< part of total_ms: from camera to finished hits, on a device
   bool cancelled = false;  ///< on_pass stopped the frame
   bool complete = true;    ///< false: cancelled, or the time was over
   /// Volume::errors_are_stated() of the volume: Frame::bounds rest on its errors.
@@ -171,17 +173,17 @@ struct Frame {
   ImageSize size{};
   std::uint32_t rows = 0, columns = 0;  ///< numbers of rays
 
-  std::vector<std::uint8_t> picture{};          ///< RGB [height][width][3]
-  std::vector<float> depth{};                   ///< [rows][columns] world units; infinity: no hit
-  std::vector<std::array<float, 3>> normals{};  ///< [rows][columns] world space, of length 1, away
-                                                ///< from larger values; 0 0 0: no hit
+  Array<std::uint8_t> picture{};          ///< RGB [height][width][3]
+  Array<float> depth{};                   ///< [rows][columns] world units; infinity: no hit
+  Array<std::array<float, 3>> normals{};  ///< [rows][columns] world space, of length 1, away from
+                                          ///< larger values; 0 0 0: no hit
   /// [rows][columns] hits in world space, rounded if Volume::float32_positions(); NaN: no hit
-  std::vector<Vector3> positions{};
-  std::vector<Hit> hits{};  ///< [rows][columns]
+  Array<Vector3> positions{};
+  Array<Hit> hits{};  ///< [rows][columns]
   /// [rows][columns] Largest possible distance to the true surface along the ray [pixels];
   /// infinity: nothing is certain. Bounds hold if the volume's errors do: see
   /// FrameStatistics::errors_are_stated.
-  std::vector<float> bounds{};
+  Array<float> bounds{};
 
   FrameStatistics statistics{};
   std::optional<DetailChoice> detail{};  ///< if max_surface_error was given

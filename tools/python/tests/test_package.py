@@ -259,6 +259,30 @@ def test_a_quick_renderer_becomes_the_devices(volume, renderer):
         assert np.array_equal(image.rgb, first.rgb) and np.array_equal(image.depth, first.depth)
 
 
+def test_arrays_are_the_renderers_memory_and_stay(volume):
+    """They are not copied. Kept arrays do not change; the memory of others is used again."""
+    renderer = volume.renderer(size=SIZE)
+    camera = renderer.camera(6)
+    views = [isowave.Camera(camera.eye[::-1], camera.at), camera]
+    kept = [renderer.render(6, camera=view) for view in 6 * views]
+    copies = [(image.rgb.copy(), image.depth.copy()) for image in kept]
+    for image, (rgb, depth) in zip(kept, copies):
+        for array in (image.rgb, image.depth, image.normals):
+            assert not array.flags.owndata and array.flags.writeable
+        assert np.array_equal(image.rgb, rgb) and np.array_equal(image.depth, depth)
+    assert not np.array_equal(copies[0][0], copies[1][0])
+    assert image.statistics["total_ms"] >= image.statistics["hits_ms"] > 0
+    addresses = {image.rgb.ctypes.data for image in kept}
+    assert len(addresses) == len(kept)
+    last = kept[-1].rgb
+    del kept, image
+    gc.collect()
+    assert renderer.render(6).rgb.ctypes.data in addresses - {last.ctypes.data}
+    del renderer
+    gc.collect()
+    assert np.array_equal(last, copies[-1][0])
+
+
 def test_passes_end_with_the_finished_picture(volume):
     renderer = volume.renderer(size=SIZE, cache_blocks=16)
     whole = renderer.render(6)

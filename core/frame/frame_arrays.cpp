@@ -1,0 +1,49 @@
+#include "core/frame/frame_arrays.hpp"
+
+#include "core/view/detail.hpp"
+#include "core/volume/world_positions.hpp"
+
+namespace isowave::core {
+
+HitMap make_hit_map(std::span<const VolumeInfo> levels) {
+  HitMap map{};
+  map.map = make_world_map(levels.front());
+  map.is_float32 = float32_holds_positions(levels.front()) ? 1 : 0;
+  const std::vector<FrameParams> grids = make_level_grids(levels);
+  map.blocks_x = grids.front().place.blocks_x;
+  map.blocks_y = grids.front().place.blocks_y;
+  map.num_levels = static_cast<uint>(grids.size());
+  for (std::size_t level = 0; level < grids.size(); ++level)
+    map.begin_z[level] = grids[level].place.begin_z;
+  return map;
+}
+
+Image8 image_of(ImageSize size, const HostArray<std::uint8_t> &picture) {
+  return {size.width, size.height, 3, picture.copy()};
+}
+
+void add_hit_arrays(const WantedArrays &wanted, std::span<const HitRecord> hits,
+                    const ShadeParams &shading, const HitMap *map, HostMemory &memory,
+                    FrameArrays &arrays) {
+  if (wanted.depth) {
+    arrays.depth = memory.array<float>(hits.size());
+    fill_from_hits(arrays.depth, hits, [](const HitRecord &hit) { return hit.t; });
+  }
+  if (wanted.normals) {
+    arrays.normals = memory.array<std::array<float, 3>>(hits.size());
+    fill_from_hits(arrays.normals, hits, [&](const HitRecord &hit) {
+      const AmbientDirection normal = world_normal(&shading, hit);
+      return std::array{normal.x, normal.y, normal.z};
+    });
+  }
+  if (wanted.positions && map != nullptr) {
+    arrays.positions = memory.array<std::array<double, 3>>(hits.size());
+    fill_from_hits(arrays.positions, hits, [&](const HitRecord &hit) {
+      std::array<double, 3> position;
+      hit_position(map, hit, position.data());
+      return position;
+    });
+  }
+}
+
+}  // namespace isowave::core
