@@ -101,8 +101,7 @@ class Renderer:
     quick
         Returns at once: a thread makes the device's renderer, which may take half a minute if a
         driver compiles kernels. Until the renderer is ready, the host draws the same bits. Volumes
-        that are too large for the host, and requests that it cannot draw (levels, bounds,
-        time_budget), wait for the device.
+        that are too large for the host wait for the device.
     """
 
     def __init__(

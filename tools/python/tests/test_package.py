@@ -17,6 +17,8 @@ import pytest
 from conftest import FUEL, TOP, sphere_voxels
 
 import isowave
+from isowave._renderer import host_renderer
+from isowave._request import Request
 
 
 SIZE = (64, 48)
@@ -221,6 +223,21 @@ def test_ambient_rays_darken_what_sees_little_of_the_sky():
 def test_device_and_host_draw_the_same_bits(volume):
     said = volume.verify(6, size=SIZE)
     assert said["equal"] and said["hits"] > 100
+
+
+def test_the_host_draws_all_that_a_device_draws():
+    options = {"voxel_pixels": 2.0}, {"max_error": 1.0}, {"time_budget": 1e6}, {"ambient": 2}
+    finer = isowave.compress(sphere_voxels(), tolerance=0.01, levels=3)
+    needed = {"levels": True, "bounds": True, "time_budget": True, "rays": True}
+    on_device, on_host = finer.renderer(size=SIZE, **needed), host_renderer(finer)
+    camera = on_device.camera(6)
+    for option in options:
+        request = Request(6, camera, SIZE, outputs=("rgb", "depth"), **option)
+        expected, got = on_device.draw(request), on_host.draw(request)
+        assert np.array_equal(got.rgb, expected.rgb), option
+        assert np.array_equal(got.depth, expected.depth), option
+    bounds = [r.draw(Request(6, camera, SIZE, outputs=("bounds",))) for r in (on_device, on_host)]
+    assert np.array_equal(bounds[0].bounds, bounds[1].bounds)
 
 
 def test_normals_are_smooth_unless_asked(renderer):
