@@ -9,9 +9,10 @@
 
 #include "core/frame/ambient_rays.hpp"
 #include "core/frame/appearance.hpp"
-#include "core/host/host_blocks.hpp"
+#include "core/host/host_levels.hpp"
 #include "core/host/host_loops.hpp"
 #include "core/io/open_volume.hpp"
+#include "core/view/detail.hpp"
 #include "reference/random.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/ray_cases.hpp"
@@ -35,7 +36,7 @@ TEST(HostLoops, AllGiveTheSameBits) {
   const ShadeParams shading = make_shade_params(volume.info(), {});
   const Image8 picture = shade_scalar(frame, shading, expected);
   const auto directions = make_ambient_directions(3);
-  const AmbientRays ambient{make_ambient_params(volume.info()), directions.data(), 3};
+  const AmbientRays ambient{make_ambient_params(volume.info()), directions.data(), 3, &frame, 0};
   const std::vector<FrameParams> frames = {frame};
   const std::vector<VolumeInfo> infos = {volume.info()};
   const std::vector<std::vector<float>> voxels = {volume.voxels};
@@ -71,6 +72,30 @@ TEST(HostLoops, AllGiveTheSameBits) {
       EXPECT_EQ(loops.inside(values, 10), host_loops().inside(values, 10));
     }
     EXPECT_GT(num_compared, 100u);
+  }
+}
+
+/// Rays that go from level of detail to level of detail, by all loops.
+TEST(HostLoops, AllGiveTheSameBitsOfLevels) {
+  const glm::uvec3 dims(33, 29, 37);
+  ArrayReader reader(test::grid_info(dims), test::sample(dims, test::gyroid_field(11)));
+  const CompressedVolume volume = compress(reader, CompressOptions{.rate = 8, .levels = 0});
+  const ImageSize size{64, 48};
+  HostLevels levels(volume, HostBlocks::kNoLimit, 0);
+  std::vector<std::vector<float>> voxels;
+  for (const CompressedVolume *level : levels_of(volume, true))
+    voxels.push_back(decode_with_libzfp(*level));
+  const std::vector<FrameParams> frames =
+      make_level_frames(levels.infos(), orbit_cameras(volume.info, 1)[0], size, 0.3f, 2.0);
+  std::vector<HitRecord> expected = render_scalar_levels(frames, voxels);
+  smooth_gradients(frames, voxels, expected);
+  const std::vector<HostLevel> drawing = levels.open(frames);
+  EXPECT_GT(drawing.size(), 1u);
+  for (const HostLoops &loops : all_host_loops()) {
+    std::vector<HitRecord> hits(size.num_rays(), no_hit());
+    EXPECT_EQ(loops.trace_levels(drawing, {0, 0, size.width, size.height}, true, hits.data()),
+              test::num_hits(expected));
+    expect_same_hits(hits, expected, size.width);
   }
 }
 

@@ -85,25 +85,50 @@ TEST_P(QuickRendererOnDevice, AFrameAtWorkIsBegunAnewByTheDevice) {
   EXPECT_EQ(frame.depth, renderer.render(wanted).depth);
 }
 
-TEST_P(QuickRendererOnDevice, WhatTheHostCannotDrawWaits) {
-  FrameRequest levels = request(), bounds = request();
-  levels.voxel_pixels = 2;
+TEST_P(QuickRendererOnDevice, TheHostDrawsAllThatTheDeviceCan) {
+  FrameRequest detail = request(), bounds = request();
+  detail.voxel_pixels = 2;
+  detail.voxel_error = 4;
   bounds.want_bounds = true;
   const std::vector<float> expected =
-      Renderer(device_, volume_, {.largest = kSize, .with_levels = true}).render(levels).depth;
+      Renderer(device_, volume_, {.largest = kSize, .with_levels = true}).render(detail).depth;
   std::unique_lock busy = busy_device();
   Renderer renderer = make();
   EXPECT_TRUE(renderer.ready_for(request()));
-  EXPECT_FALSE(renderer.ready_for(bounds));
-  EXPECT_FALSE(renderer.ready_for(levels));
+  EXPECT_TRUE(renderer.ready_for(detail));
   const auto what_it_can = [&] {
-    return std::array{renderer.can_draw(levels), renderer.can_draw(bounds)};
+    return std::array{renderer.can_draw(detail), renderer.can_draw(bounds)};
   };
   EXPECT_EQ(what_it_can(), (std::array{true, false})) << "before it is ready";
-  auto frame = std::async(std::launch::async, [&] { return renderer.render(levels); });
+  EXPECT_EQ(renderer.render(detail).depth, expected);
+  EXPECT_FALSE(renderer.ready());
   busy.unlock();
-  EXPECT_EQ(frame.get().depth, expected);
+  renderer.wait();
+  EXPECT_EQ(renderer.render(detail).depth, expected);
   EXPECT_EQ(what_it_can(), (std::array{true, false}));
+}
+
+/// Bounds are found by whoever draws.
+TEST_P(QuickRendererOnDevice, BoundsDoNotWaitForTheDevice) {
+  const auto volume = core::test::public_volume();
+  for (const bool with_levels : {false, true}) {
+    FrameRequest wanted = request();
+    wanted.voxel_pixels = with_levels ? 2 : 0;
+    wanted.want_bounds = true;
+    std::unique_lock busy = busy_device();
+    Renderer renderer = make_quick_renderer(device_, volume,
+                                            {.largest = kSize,
+                                             .with_levels = with_levels,
+                                             .with_bounds = true,
+                                             .with_time_budget = true});
+    EXPECT_TRUE(renderer.ready_for(wanted));
+    const Frame frame = renderer.render(wanted);
+    EXPECT_FALSE(renderer.ready());
+    busy.unlock();
+    renderer.wait();
+    EXPECT_EQ(renderer.render(wanted).bounds, frame.bounds);
+    EXPECT_EQ(frame.bounds.size(), kSize.width * kSize.height);
+  }
 }
 
 TEST_P(QuickRendererOnDevice, ErrorsOfTheDeviceComeWithTheNextFrame) {

@@ -100,12 +100,6 @@ void advise(const CompressedVolume &volume, double error, double max_surface_err
 
 }  // namespace
 
-RendererOptions with_choices(RendererOptions options, const CompressedVolume &volume) {
-  options.with_bounds = true;
-  options.with_levels = !volume.coarser_levels.empty();
-  return options;
-}
-
 DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, double rate,
                            const FrameRequest &request, double max_surface_error) {
   check_max_surface_error(max_surface_error);

@@ -3,7 +3,6 @@
 // bit planes may be. That saves blocks; on CPUs it costs time (bench/detail.md).
 
 #include "core/accuracy/certify.hpp"
-#include "core/render/renderer_options.hpp"
 
 namespace isowave::core {
 
@@ -20,13 +19,10 @@ inline constexpr double kMaxBlocksShare = 2.0 / 3;
 /// errors measured block by block (README.md).
 inline constexpr double kMinPlaneRate = 16;
 
-/// Options with what choose_detail() needs: bounds, and all levels of detail of the volume.
-RendererOptions with_choices(RendererOptions options, const CompressedVolume &volume);
-
 /// Chooses the detail of one frame.
 ///
-/// renderer           made with_choices(), or a team of such renderers; its last frame is then
-///                    another one
+/// renderer           with bounds and all levels of detail of the volume, or a team of such
+///                    renderers; its last frame is then another one
 /// volume             the volume that this process's renderer was made for
 /// rate               rate of the whole volume [bits per voxel]
 /// request            the frame's request; its voxel_pixels and voxel_error do not matter

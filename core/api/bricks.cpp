@@ -127,7 +127,7 @@ Renderer make_team_renderer(Processes &processes, const std::filesystem::path &p
     });
     auto result = std::make_unique<Renderer::Implementation>(
         std::shared_ptr<Turns>(held, &held->turns), volume.brick,
-        add_choices(std::move(renderer), options.renderer, volume.brick, volume.rate));
+        add_choices(std::move(renderer), choices_of(options.renderer), volume.brick, volume.rate));
     result->device_info = held->device->info;
     result->grid = public_grid(volume.whole());
     result->notices = held->notices;

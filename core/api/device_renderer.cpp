@@ -3,12 +3,10 @@
 #include <mutex>
 #include <utility>
 
-#include "core/accuracy/bounded_renderer.hpp"
 #include "core/api/device_implementation.hpp"
 #include "core/api/frame_parts.hpp"
 #include "core/api/guarded.hpp"
 #include "core/api/volume_implementation.hpp"
-#include "core/frame/timed_renderer.hpp"
 #include "core/render/device_renderer.hpp"
 
 namespace isowave {
@@ -25,14 +23,8 @@ core::RendererOptions core_options(const RendererOptions &options, std::uint32_t
   return result;
 }
 
-std::unique_ptr<core::Renderer> add_choices(std::unique_ptr<core::Renderer> renderer,
-                                            const RendererOptions &options,
-                                            const core::CompressedVolume &volume, double rate) {
-  if (options.with_bounds)
-    renderer = std::make_unique<core::BoundedRenderer>(std::move(renderer), volume, rate);
-  if (options.with_time_budget)
-    renderer = std::make_unique<core::TimedRenderer>(std::move(renderer));
-  return renderer;
+Choices choices_of(const RendererOptions &options) {
+  return {options.with_bounds, options.with_time_budget};
 }
 
 core::Abilities abilities_on_device(const RendererOptions &options, const Volume &volume) {
@@ -52,7 +44,7 @@ std::unique_ptr<core::Renderer> make_on_device(Device &device, const Volume &vol
   const KernelWatch watch(on.device, before_kernel);
   return add_choices(std::make_unique<core::DeviceRenderer>(
                          on.device, compressed, core_options(options, volume.num_levels())),
-                     options, compressed, compressed.rate());
+                     choices_of(options), compressed, compressed.rate());
 }
 
 void check_there(const std::shared_ptr<Device> &device,

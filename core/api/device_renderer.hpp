@@ -4,16 +4,14 @@
 #include <functional>
 #include <memory>
 
+#include "core/api/choices.hpp"
 #include "core/api/renderer_implementation.hpp"
 #include "core/render/renderer_options.hpp"
 
 namespace isowave {
 
 core::RendererOptions core_options(const RendererOptions &options, std::uint32_t num_levels);
-/// Puts renderers with the abilities of the options around a device's renderer.
-std::unique_ptr<core::Renderer> add_choices(std::unique_ptr<core::Renderer> renderer,
-                                            const RendererOptions &options,
-                                            const core::CompressedVolume &volume, double rate);
+Choices choices_of(const RendererOptions &options);
 /// Abilities of the renderer that make_on_device() makes.
 core::Abilities abilities_on_device(const RendererOptions &options, const Volume &volume);
 /// Makes a renderer, in a turn of the device. before_kernel: called before each kernel is compiled;

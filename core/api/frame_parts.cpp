@@ -91,8 +91,9 @@ void check_wanted(const FrameRequest &request, const core::Abilities &abilities)
     throw core::Error("the surface of a bound has no error: draw the volume itself");
   if (!abilities.bounds) {
     throw core::Error(
-        "this renderer knows no bounds of the error: leave out want_bounds, or draw on a device by "
-        "a renderer that was made with_bounds");
+        "this renderer knows no bounds of the error: leave out want_bounds, or draw on the host, "
+        "or "
+        "on a device by a renderer that was made with_bounds");
   }
 }
 

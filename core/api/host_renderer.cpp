@@ -3,19 +3,32 @@
 #include <utility>
 
 #include "core/api/guarded.hpp"
+#include "core/api/host_renderer.hpp"
 #include "core/api/renderer_implementation.hpp"
 #include "core/api/volume_implementation.hpp"
 #include "core/host/host_renderer.hpp"
 
 namespace isowave {
 
+std::unique_ptr<core::Renderer> make_on_host(const core::CompressedVolume &volume,
+                                             const HostRendererOptions &options) {
+  return add_choices(
+      std::make_unique<core::HostRenderer>(
+          volume, core::HostRendererOptions{options.memory_limit, options.num_threads}),
+      {.with_bounds = true, .with_time_budget = true}, volume, volume.rate());
+}
+
+core::Abilities abilities_on_host(const core::CompressedVolume &volume) {
+  core::Abilities abilities = core::HostRenderer::abilities_of(volume);
+  abilities.surface_error = abilities.time_budget = true;
+  return abilities;
+}
+
 Renderer make_host_renderer(std::shared_ptr<const Volume> volume,
                             const HostRendererOptions &options) {
   return core::guarded("making a renderer", [&] {
     if (!volume) throw core::Error("a renderer needs a volume");
-    auto on_host = std::make_unique<core::HostRenderer>(
-        volume->implementation().volume,
-        core::HostRendererOptions{options.memory_limit, options.num_threads});
+    auto on_host = make_on_host(volume->implementation().volume, options);
     return Renderer(std::make_unique<Renderer::Implementation>(
         std::make_shared<Turns>(), std::move(volume), std::move(on_host)));
   });

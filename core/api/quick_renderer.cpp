@@ -5,10 +5,10 @@
 #include "core/api/device_implementation.hpp"
 #include "core/api/device_renderer.hpp"
 #include "core/api/guarded.hpp"
+#include "core/api/host_renderer.hpp"
 #include "core/api/volume_implementation.hpp"
 #include "core/base/error.hpp"
 #include "core/frame/soon_renderer.hpp"
-#include "core/host/host_renderer.hpp"
 #include "core/render/memory_plan.hpp"
 
 namespace isowave {
@@ -48,13 +48,9 @@ Renderer make_quick_renderer(std::shared_ptr<Device> device, std::shared_ptr<con
         .make = [&to = *device, &of = *volume,
                  options](const std::stop_token &stop) { return make_soon(to, of, options, stop); },
         .before_use = [&on, &turn = *turns] { turn.take(on.mutex); },
-        .meanwhile_abilities = core::HostRenderer::all_abilities(),
-        .make_meanwhile =
-            [&compressed, host_options] {
-              return std::make_unique<core::HostRenderer>(
-                  compressed,
-                  core::HostRendererOptions{host_options.memory_limit, host_options.num_threads});
-            },
+        .meanwhile_abilities = abilities_on_host(compressed),
+        .make_meanwhile = [&compressed,
+                           host_options] { return make_on_host(compressed, host_options); },
     });
     core::SoonRenderer *const soon = renderer.get();
     auto result =

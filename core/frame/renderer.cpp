@@ -53,21 +53,22 @@ void check(const FrameRequest &request, const Abilities &abilities) {
   need(request.camera.parallel_height.has_value(), abilities.parallel,
        "this renderer draws in perspective alone: leave out parallel projection");
   need(request.voxel_pixels > 0, abilities.levels,
-       "this renderer draws the finest level of detail alone: leave out voxel_pixels, or draw on a "
-       "device by a renderer that was made with_levels");
+       "this renderer draws the finest level of detail alone: leave out voxel_pixels, or draw a "
+       "volume with levels on the host, or on a device by a renderer that was made with_levels");
   need(request.voxel_error > 0, abilities.fewer_planes,
-       "this renderer decodes all bit planes: leave out voxel_error, or draw on a device");
+       "this renderer decodes all bit planes: leave out voxel_error, or draw on a device or the "
+       "host");
   need(request.bound != FieldBound::kNone, abilities.bounds,
-       "this renderer draws no bounds of the field: leave out bound, or draw on a device by a "
-       "renderer that was made with_bounds");
+       "this renderer draws no bounds of the field: leave out bound, or draw on the host, or on a "
+       "device by a renderer that was made with_bounds");
   need(request.ambient_rays != 0, abilities.given_rays,
        "ambient rays need a renderer that was made with_rays");
   need(request.max_surface_error.has_value(), abilities.surface_error,
-       "this renderer knows no bounds of the error: leave out max_surface_error, or draw on a "
-       "device by a renderer that was made with_bounds");
+       "this renderer knows no bounds of the error: leave out max_surface_error, or draw on the "
+       "host, or on a device by a renderer that was made with_bounds");
   need(request.time_budget_ms.has_value(), abilities.time_budget,
-       "this renderer keeps no time: leave out time_budget_ms, or draw on a device by a renderer "
-       "that was made with_time_budget");
+       "this renderer keeps no time: leave out time_budget_ms, or draw on the host, or on a device "
+       "by a renderer that was made with_time_budget");
 }
 
 Image8 Renderer::shade(const Appearance &appearance) {

@@ -110,8 +110,10 @@ void SoonRenderer::clear_cache() {
 }
 
 std::vector<VolumeInfo> SoonRenderer::levels() const {
-  wait();
-  return made_->levels();
+  if (drawn_by_ == nullptr) wait();
+  std::vector<VolumeInfo> levels = (drawn_by_ != nullptr ? drawn_by_ : made_.get())->levels();
+  if (!parts_.abilities.levels) levels.erase(levels.begin() + 1, levels.end());
+  return levels;
 }
 
 Renderer &SoonRenderer::inner() const {

@@ -56,7 +56,7 @@ class SoonRenderer : public RendererAround {
   Abilities abilities() const override { return parts_.abilities; }
   const Abilities &meanwhile_abilities() const { return parts_.meanwhile_abilities; }
   Team &team() override { return alone_; }
-  /// Waits until ready().
+  /// Waits until ready() if no frame was drawn.
   std::vector<VolumeInfo> levels() const override;
   FrameStats render(const FrameRequest &request) override;
   std::vector<HitRecord> cast_rays(std::span<const WorldRay> rays, float isovalue,

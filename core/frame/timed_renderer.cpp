@@ -121,7 +121,9 @@ TimedRenderer::Drawn TimedRenderer::draw_step(const FrameRequest &request, std::
 void TimedRenderer::check_can_keep(const FrameRequest &request) const {
   const Abilities can = abilities();
   const ImageSize full = size_of(request, can);
-  const std::uint64_t most = halved(can.largest, 1).num_rays();
+  // A renderer of pictures of any size keeps pictures of any size.
+  const std::uint64_t most =
+      can.most_rays == Abilities{}.most_rays ? can.most_rays : halved(can.largest, 1).num_rays();
   if (halved(full, 1).num_rays() > most) {
     throw Error("half of {}x{} pixels cannot be kept: the renderer keeps a picture of {} rays",
                 full.width, full.height, most);

@@ -10,6 +10,7 @@
 #include "core/platform/memory.hpp"
 #include "core/view/frame.hpp"
 #include "core/volume/range_thresholds.hpp"
+#include "kernels_cl/portable/block_bound.h"
 #include "kernels_cl/portable/block_cells.h"
 
 namespace isowave::core {
@@ -68,6 +69,20 @@ std::uint64_t num_pages(std::uint64_t num_bytes) {
 
 }  // namespace
 
+HostValues::HostValues(const CompressedVolume &level, bool is_finest, double voxel_error,
+                       FieldBound bound, const std::array<float, 2> &value_range)
+    : HostValues(level) {
+  const BlockPrecision planes = with_fewer_planes(level.precision, voxel_error);
+  min_exponent = planes.min_exponent;
+  whole_numbers = planes.whole_numbers;
+  plane_error = isowave::core::plane_error(level.precision, voxel_error);
+  if (bound == FieldBound::kNone) return;
+  const ValueOffset offset =
+      value_offset(LevelError(level, is_finest), bound, plane_error, value_range);
+  uniform = offset.uniform;
+  unit = offset.unit;
+}
+
 HostBlocks::Pages::Pages(std::uint64_t num_bytes)
     : memory(num_bytes), taken(num_pages(num_bytes)) {}
 
@@ -79,14 +94,23 @@ std::uint64_t HostBlocks::bytes(const VolumeInfo &info) {
          num_pages(num_blocks * sizeof(ulong)) + kNumThresholds * sizeof(float);
 }
 
-std::uint64_t HostBlocks::least_bytes(const VolumeInfo &info) {
-  return bytes(info) + kLeastPages * platform::page_bytes();
+std::uint64_t HostBlocks::ray_bytes() {
+  return kLeastPages * platform::page_bytes();
 }
 
 HostBlocks::HostBlocks(const CompressedVolume &volume, std::uint64_t memory_limit,
                        std::uint32_t num_threads)
+    : HostBlocks(volume, std::make_unique<HostRoom>(memory_limit, num_threads), num_threads) {}
+
+HostBlocks::HostBlocks(const CompressedVolume &volume, std::unique_ptr<HostRoom> room,
+                       std::uint32_t num_threads)
+    : HostBlocks(volume, *room, num_threads) {
+  own_room_ = std::move(room);
+}
+
+HostBlocks::HostBlocks(const CompressedVolume &volume, HostRoom &room, std::uint32_t num_threads)
     : volume_(&volume),
-      memory_limit_(memory_limit),
+      room_(&room),
       num_threads_(num_threads),
       blocks_(volume.num_blocks()),
       macrocells_((blocks_ + kEdge - 1u) / kEdge),
@@ -95,9 +119,11 @@ HostBlocks::HostBlocks(const CompressedVolume &volume, std::uint64_t memory_limi
       changing_(volume.block_count() * sizeof(ulong)),
       decoded_(volume.block_count()),
       opened_(volume.block_count()),
-      num_bytes_(bytes(volume.info)),
+      decoded_as_(volume),
       selection_(kFirstSelection) {
   find_ranges();
+  room.hold(bytes(volume.info));
+  room.add([this] { drop(); });
 }
 
 /// As far as decode() needs it, in host memory.
@@ -228,8 +254,64 @@ std::optional<BlockBox> HostBlocks::box_of(Holds holds) const {
   return box;
 }
 
+void HostBlocks::decode_as(const HostValues &values) {
+  if (decoded_as_ == values) return;
+  decoded_as_ = values;
+  selected_.reset();
+  forget();
+}
+
+/// May cells whose values of all planes are from low to high have values on both sides, as blocks
+/// are decoded now? Rounding keeps the order of values: sums of a larger value and a larger offset
+/// are no smaller.
+///
+/// bound_code  the largest of the cells' blocks (BlockBounds)
+bool HostBlocks::may_hold(float low, float high, std::uint32_t bound_code, float isovalue) const {
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  const float offset = decoded_as_.uniform + decoded_as_.unit * block_bound(bound_code);
+  if (decoded_as_.plane_error != 0) {
+    low = std::nextafter(static_cast<float>(double{low} - decoded_as_.plane_error), -kInfinity);
+    high = std::nextafter(static_cast<float>(double{high} + decoded_as_.plane_error), kInfinity);
+  }
+  return !(low + std::min(offset, 0.0f) - isovalue >= 0.0f) &&
+         high + std::max(offset, 0.0f) - isovalue >= 0.0f;
+}
+
+/// The largest code of a block and those neighbours whose voxels its dual cells have.
+std::uint32_t HostBlocks::dual_grid_code(const glm::uvec3 &block) const {
+  std::uint32_t code = 0;
+  for (uint corner = 0; corner < 8; ++corner) {
+    const glm::uvec3 at = glm::min(block + corner_of(corner), blocks_ - 1u);
+    code = std::max<std::uint32_t>(code, volume_->bounds.codes[block_at(at)]);
+  }
+  return code;
+}
+
+/// The bits of a macrocell's blocks that may hold the isovalue.
+ulong HostBlocks::blocks_that_hold(std::size_t macrocell, float isovalue) const {
+  const bool has_codes = decoded_as_.unit != 0;
+  const std::uint32_t widest = has_codes ? ISO_BOUND_CODES - 1 : 0;
+  const float *low = ranges_.low.data() + 64 * macrocell,
+              *high = ranges_.high.data() + 64 * macrocell;
+  if (!may_hold(macrocell_ranges_.low[macrocell], macrocell_ranges_.high[macrocell], widest,
+                isovalue))
+    return 0;
+  if (decoded_as_.plane_error == 0 && decoded_as_.uniform == 0)
+    return host_loops().inside(high, isovalue) & ~host_loops().inside(low, isovalue);
+  ulong mask = 0;
+  const glm::uvec3 first = kEdge * place_of(macrocell, macrocells_);
+  for (uint bit = 0; bit < 64; ++bit) {
+    if (low[bit] > high[bit] || !may_hold(low[bit], high[bit], widest, isovalue)) continue;
+    const glm::uvec3 block = first + glm::uvec3(bit & 3, bit >> 2 & 3, bit >> 4);
+    const bool holds = !has_codes || may_hold(low[bit], high[bit], dual_grid_code(block), isovalue);
+    mask |= static_cast<ulong>(holds) << bit;
+  }
+  return mask;
+}
+
 /// A block has cells that change if its dual cells have voxels on both sides: any two of these
-/// voxels are connected by cells of the block, so that one of the cells has both.
+/// voxels are connected by cells of the block, so that one of the cells has both. A block that is
+/// not active is on the side of its values of all planes, too.
 void HostBlocks::select(float isovalue) {
   if (selected_ == isovalue) return;
   selected_.reset();
@@ -237,14 +319,8 @@ void HostBlocks::select(float isovalue) {
     fill(opened_, kNone);
     selection_ = kFirstSelection;
   }
-  const HostLoops &loops = host_loops();
   const std::optional<BlockBox> box = box_of([&](std::size_t macrocell) {
-    const bool none = macrocell_ranges_.low[macrocell] - isovalue >= 0.0f ||
-                      !(macrocell_ranges_.high[macrocell] - isovalue >= 0.0f);
-    return masks_[macrocell] =
-               none ? 0
-                    : loops.inside(ranges_.high.data() + 64 * macrocell, isovalue) &
-                          ~loops.inside(ranges_.low.data() + 64 * macrocell, isovalue);
+    return masks_[macrocell] = blocks_that_hold(macrocell, isovalue);
   });
   const BlockBox around = box.value_or(BlockBox{glm::ivec3(0), glm::ivec3(0)});
   surface_ = {.isovalue = isovalue,
@@ -276,6 +352,10 @@ std::optional<BlockBox> HostBlocks::rounded_box(float isovalue) const {
   });
 }
 
+std::array<float, 2> HostBlocks::extremes() const {
+  return {std::ranges::min(macrocell_ranges_.low), std::ranges::max(macrocell_ranges_.high)};
+}
+
 // ---- Blocks, when rays come to them
 //
 // A block's values are written only by the thread that sets decoded_ from kNone to kBeingMade; the
@@ -286,49 +366,15 @@ std::optional<BlockBox> HostBlocks::rounded_box(float isovalue) const {
 // parallel_for() has joined.
 
 HostField HostBlocks::field() {
-  return {values(), changing(), masks_.data(), decoded_.data(), opened_.data(), selection_, this};
-}
-
-void HostBlocks::run(std::uint64_t num_items,
-                     const std::function<void(std::uint64_t item, bool is_alone)> &work) {
-  std::vector<uchar> is_done(num_items);
-  for (;;) {
-    std::atomic<bool> any_done = false;
-    try {
-      parallel_for(num_items, num_threads_, [&](std::uint64_t item, std::uint32_t) {
-        if (is_done[item] != 0) return;
-        work(item, false);
-        is_done[item] = 1;
-        any_done.store(true, std::memory_order_relaxed);
-      });
-      return;
-    } catch (const NoRoom &) {
-      drop();
-    }
-    if (any_done) continue;
-    const auto next = std::ranges::find(is_done, 0);
-    is_alone_ = true;
-    try {
-      work(static_cast<std::uint64_t>(next - is_done.begin()), true);
-    } catch (...) {
-      is_alone_ = false;
-      throw;
-    }
-    is_alone_ = false;
-    *next = 1;
-  }
-}
-
-/// Does what needs some blocks at a time. A thread alone makes room for them.
-template <class Work>
-void HostBlocks::with_room(Work work) {
-  if (!is_alone_) return work();
-  try {
-    work();
-  } catch (const NoRoom &) {
-    drop();
-    work();
-  }
+  return {.values = values(),
+          .changing = changing(),
+          .masks = masks_.data(),
+          .highs = ranges_.high.data(),
+          .has_gaps = !volume_->no_data.empty(),
+          .decoded = decoded_.data(),
+          .opened = opened_.data(),
+          .selection = selection_,
+          .maker = this};
 }
 
 void HostBlocks::open(std::size_t block) {
@@ -337,7 +383,7 @@ void HostBlocks::open(std::size_t block) {
   // Beyond the volume, any voxels do: they matter to cells outside it alone.
   for (uint corner = 0; corner < 8; ++corner)
     dual_grid[corner] = block_at(glm::min(place + corner_of(corner), blocks_ - 1u));
-  with_room([&] {
+  room_->with_room([&] {
     for (const std::size_t id : dual_grid) decode_once(id);
     take_page(changing_, block * sizeof(ulong));
     find_changing(block, dual_grid);
@@ -345,7 +391,7 @@ void HostBlocks::open(std::size_t block) {
 }
 
 void HostBlocks::decode(std::span<const std::size_t> blocks) {
-  with_room([&] {
+  room_->with_room([&] {
     for (const std::size_t id : blocks) decode_once(id);
   });
 }
@@ -379,6 +425,8 @@ void HostBlocks::decode_once(std::size_t block) {
 
 void HostBlocks::decode_to(std::size_t block, float *values) const {
   EncodedBlock bits = encoded(block);
+  bits.min_exponent = decoded_as_.min_exponent;
+  bits.whole_numbers = decoded_as_.whole_numbers;
   std::array<uint, (ISO_MAX_BLOCK_BITS + 31) / 32 + kDecoderAhead> words;
   if (volume_->file) {
     volume_->read_words(bits.first_bit,
@@ -387,6 +435,10 @@ void HostBlocks::decode_to(std::size_t block, float *values) const {
     bits.first_bit = 0;
   }
   host_loops().decode(bits, values);
+  if (decoded_as_.uniform == 0) return;
+  const ValueOffset offset{decoded_as_.uniform, decoded_as_.unit};
+  for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v)
+    values[v] += offset_of_voxel(offset, volume_->bounds, block, v);
 }
 
 /// Finds the cells of the block that change, from the values of its decoded dual grid.
@@ -418,12 +470,8 @@ void HostBlocks::take_page(Pages &pages, std::uint64_t byte) {
   const std::uint64_t page_bytes = platform::page_bytes();
   std::atomic<uchar> &taken = pages.taken[byte / page_bytes];
   if (taken.load(std::memory_order_relaxed) != 0) return;
-  if (num_bytes_.fetch_add(page_bytes, std::memory_order_relaxed) + page_bytes > memory_limit_) {
-    num_bytes_.fetch_sub(page_bytes, std::memory_order_relaxed);
-    throw NoRoom();
-  }
-  if (taken.exchange(1, std::memory_order_relaxed) != 0)
-    num_bytes_.fetch_sub(page_bytes, std::memory_order_relaxed);
+  room_->take(page_bytes);
+  if (taken.exchange(1, std::memory_order_relaxed) != 0) room_->give_back(page_bytes);
 }
 
 bool HostBlocks::is_decoded(std::size_t block) const {
@@ -438,11 +486,15 @@ void HostBlocks::forget() {
 /// Forgets what is decoded, and gives its memory back.
 void HostBlocks::drop() {
   forget();
-  for (Pages *pages : {&values_, &changing_}) {
-    pages->memory.release();
-    fill(pages->taken, 0);
-  }
-  num_bytes_ = bytes(volume_->info);
+  for (Pages *pages : {&values_, &changing_}) release(*pages);
+}
+
+void HostBlocks::release(Pages &pages) {
+  const auto num_taken = std::ranges::count_if(
+      pages.taken, [](const std::atomic<uchar> &taken) { return taken.load() != 0; });
+  pages.memory.release();
+  fill(pages.taken, 0);
+  room_->give_back(static_cast<std::uint64_t>(num_taken) * platform::page_bytes());
 }
 
 }  // namespace isowave::core

@@ -1,7 +1,9 @@
 #pragma once
-// A compressed volume for rays on the host: the value ranges of all blocks; for blocks that rays
-// come to, also their voxels, and the cells that an isovalue crosses.
+// A compressed volume, or one of its levels of detail, for rays on the host: the value ranges of
+// all blocks; for blocks that rays come to, also their voxels, and the cells that an isovalue
+// crosses.
 
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <functional>
@@ -12,19 +14,42 @@
 
 #include "core/base/reserved_memory.hpp"
 #include "core/host/host_loops.hpp"
+#include "core/host/host_room.hpp"
 #include "core/volume/block_box.hpp"
+#include "core/zfp/level_bounds.hpp"
 #include "core/zfp/zfp_stream.hpp"
 
 namespace isowave::core {
+
+/// The values that blocks are decoded to: with fewer bit planes, or raised or lowered.
+struct HostValues {
+  /// voxel_error   see with_fewer_planes()
+  /// is_finest     it is the volume itself
+  /// value_range   of the volume
+  /// Throws        Error: as value_offset()
+  HostValues(const CompressedVolume &level, bool is_finest, double voxel_error, FieldBound bound,
+             const std::array<float, 2> &value_range);
+  /// All bit planes of the volume itself.
+  explicit HostValues(const CompressedVolume &level)
+      : min_exponent(level.precision.min_exponent), whole_numbers(level.precision.whole_numbers) {}
+  bool operator==(const HostValues &) const = default;
+
+  std::int32_t min_exponent;
+  bool whole_numbers;
+  double plane_error = 0;       ///< how far values may be from those of all planes
+  float uniform = 0, unit = 0;  ///< of ValueOffset
+};
 
 /// The blocks of a volume. Not thread-safe, except the functions that rays call (BlockMaker).
 class HostBlocks final : private BlockMaker {
  public:
   /// Memory of a volume with this grid if nothing is decoded.
   static std::uint64_t bytes(const VolumeInfo &info);
-  /// The least limit: bytes(), and room for the blocks that a single ray needs at a time.
-  static std::uint64_t least_bytes(const VolumeInfo &info);
-  static constexpr std::uint64_t kNoLimit = ~std::uint64_t{0};
+  /// Room for the blocks that a single ray needs at a time.
+  static std::uint64_t ray_bytes();
+  /// The least limit.
+  static std::uint64_t least_bytes(const VolumeInfo &info) { return bytes(info) + ray_bytes(); }
+  static constexpr std::uint64_t kNoLimit = HostRoom::kNoLimit;
 
   /// Decodes the finest level once, only for the ranges. This takes 128 more bytes for each block
   /// of a layer along z.
@@ -35,26 +60,29 @@ class HostBlocks final : private BlockMaker {
   /// Throws        Error: a file that the volume is in has become shorter, or cannot be read
   HostBlocks(const CompressedVolume &volume, std::uint64_t memory_limit, std::uint32_t num_threads);
   HostBlocks(CompressedVolume &&, std::uint64_t, std::uint32_t) = delete;
+  /// The same within memory that others share. room: must outlive this
+  HostBlocks(const CompressedVolume &volume, HostRoom &room, std::uint32_t num_threads);
 
-  /// Finds the blocks that have cells whose corners are not all on one side of an isovalue, for
+  /// Has blocks decoded to these values, and forgets those of others. Before: all planes.
+  void decode_as(const HostValues &values);
+
+  /// Finds the blocks that may have cells whose corners are not all on one side of an isovalue, for
   /// field() and surface(). Does nothing if the isovalue is in use. Other cells cannot have a hit
   /// (cell_intersect.h), so rays may skip them. Decoded blocks stay.
   void select(float isovalue);
 
   /// The field that rays walk through, within run(). Stays valid until the next select().
   HostField field();
-  /// The selected isovalue, and the box around the blocks that have such a cell.
+  /// The selected isovalue, and the box around the blocks that may have such a cell.
   const Surface &surface() const { return surface_; }
 
-  /// Calls work(item, is_alone) for each item below num_items on all threads. Its rays decode the
-  /// blocks that they need. If decoded blocks would pass the memory limit, items end with an
-  /// exception, all decoded blocks are dropped, and these items begin again. If no item can be
-  /// finished in this way, one thread does the next item, with is_alone: its rays must be traced
-  /// one by one, not in packets, since there is room only for the blocks of one ray at a time.
+  /// As HostRoom::run().
   ///
   /// Throws  Error: a file cannot be read; an exception of work
   void run(std::uint64_t num_items,
-           const std::function<void(std::uint64_t item, bool is_alone)> &work);
+           const std::function<void(std::uint64_t item, bool is_alone)> &work) {
+    room_->run(num_items, work);
+  }
 
   /// Forgets all decoded blocks. Their memory is kept, and counted.
   void forget();
@@ -62,18 +90,17 @@ class HostBlocks final : private BlockMaker {
   /// Number of blocks that have been decoded for rays, from the start.
   std::uint64_t num_decoded() const { return num_decoded_.load(std::memory_order_relaxed); }
   /// Memory at present: value ranges and decoded blocks, in whole pages of the system.
-  std::uint64_t bytes() const { return num_bytes_.load(std::memory_order_relaxed); }
+  std::uint64_t bytes() const { return room_->bytes(); }
 
   /// The box around the blocks that hold an isovalue, by value ranges in 8 bits as Macrocells has
   /// them. So views from this box are those of a device.
   ///
   /// Returns  nothing if there is no such block
   std::optional<BlockBox> rounded_box(float isovalue) const;
+  /// The least and the largest of all voxels with data, of all bit planes.
+  std::array<float, 2> extremes() const;
 
  private:
-  /// Thrown if decoded blocks would pass the memory limit.
-  struct NoRoom {};
-
   /// An array of which only parts are written to, page by page.
   struct Pages {
     Pages(std::uint64_t num_bytes);
@@ -87,16 +114,20 @@ class HostBlocks final : private BlockMaker {
     std::vector<float> low, high;
   };
 
+  HostBlocks(const CompressedVolume &volume, std::unique_ptr<HostRoom> room,
+             std::uint32_t num_threads);
   void open(std::size_t block) override;
   void decode(std::span<const std::size_t> blocks) override;
-  template <class Work>
-  void with_room(Work work);
   void drop();
+  void release(Pages &pages);
   void take_page(Pages &pages, std::uint64_t byte);
   void decode_once(std::size_t block);
   void decode_to(std::size_t block, float *values) const;
   void find_changing(std::size_t block, std::span<const std::size_t, 8> dual_grid);
 
+  ulong blocks_that_hold(std::size_t macrocell, float isovalue) const;
+  bool may_hold(float low, float high, std::uint32_t bound_code, float isovalue) const;
+  std::uint32_t dual_grid_code(const glm::uvec3 &block) const;
   void find_ranges();
   void ranges_of_layer(std::uint32_t z, std::span<BlockRange> ranges,
                        std::span<float> sampled) const;
@@ -113,7 +144,8 @@ class HostBlocks final : private BlockMaker {
   ulong *changing() const { return static_cast<ulong *>(changing_.memory.data()); }
 
   const CompressedVolume *volume_;
-  std::uint64_t memory_limit_;
+  std::unique_ptr<HostRoom> own_room_;
+  HostRoom *room_;
   std::uint32_t num_threads_;
   glm::uvec3 blocks_, macrocells_;  ///< numbers of, along each axis
   DualRanges ranges_;
@@ -122,8 +154,8 @@ class HostBlocks final : private BlockMaker {
   std::vector<ulong> masks_;
   Pages values_, changing_;  ///< [block][64]; [block]
   std::vector<std::atomic<uchar>> decoded_, opened_;
-  std::atomic<std::uint64_t> num_bytes_, num_decoded_ = 0;
-  bool is_alone_ = false;
+  std::atomic<std::uint64_t> num_decoded_ = 0;
+  HostValues decoded_as_;
   uchar selection_;
   std::optional<float> selected_;
   Surface surface_{};

@@ -1,9 +1,13 @@
+// Ids of blocks count on through all levels of detail. Before anything is included.
+#define ISO_LEVELS 1
 #include "core/host/host_loops.hpp"
 
 #include "core/frame/solvers.hpp"
 #include "core/host/host_packets.hpp"
 #include "kernels_cl/portable/block_cells.h"
 #include "kernels_cl/portable/cell_intersect.h"
+#include "kernels_cl/portable/level_border.h"
+#include "kernels_cl/portable/ray_state.h"
 #include "kernels_cl/portable/smooth_gradient.h"
 #include "kernels_cl/portable/zfp_codec.h"
 
@@ -104,6 +108,11 @@ inline void decode_stencil(const FrameParams &frame, const HostField &field, con
   if (!all_decoded) field.maker->decode({blocks, num_blocks});
 }
 
+/// Is it a hit in this level of detail?
+inline bool is_hit_of(const FrameParams &frame, const HitRecord &hit) {
+  return hit.t != INFINITY && level_block_of(&frame, hit.block_id) != ISO_INVALID_ID;
+}
+
 /// Gives a hit the smooth gradient, if there is one.
 inline void smooth_gradient(const FrameParams &frame, const HostField &field, LastPlanes last,
                             HitRecord *hit) {
@@ -127,7 +136,8 @@ inline void smooth_gradient(const FrameParams &frame, const HostField &field, La
   hit->grad_z = derivatives[2];
 }
 
-/// The first hit of a ray in a block's changing cells. enter: by which it enters the block.
+/// The first hit of a ray in a block's changing cells, before its band ends. enter: by which it
+/// enters the block.
 inline bool trace_block(const FrameParams &frame, const HostField &field, const Ray &ray,
                         const GridWalk &block, RayEvent enter, LastPlanes last, HitRecord *hit) {
   const BlockCoords b = {static_cast<uint>(block.x), static_cast<uint>(block.y),
@@ -137,6 +147,7 @@ inline bool trace_block(const FrameParams &frame, const HostField &field, const 
   const ulong changing = field.changing[block_number];
   CellWalk at = enter_cells(&ray, b, enter, last);
   do {
+    if (passes_border(at.exit, frame.band.end_t)) at.exit = border_event(frame.band.end_t);
     if ((changing >> cell_in_block(&at.cell) & 1u) == 0) continue;
     const int x = at.cell.x, y = at.cell.y, z = at.cell.z;
     float w[8];
@@ -146,7 +157,7 @@ inline bool trace_block(const FrameParams &frame, const HostField &field, const 
     *hit = make_hit(&frame, &ray, w, x, y, z, at.enter, at.exit,
                     refine(kDefaultSolver, change.cubic, change.bracket));
     return true;
-  } while (next_cell(&at, &ray, last));
+  } while (at.exit.axis != ISO_AXIS_START && next_cell(&at, &ray, last));
   return false;
 }
 
@@ -182,14 +193,14 @@ inline ActiveBox active_box(const Surface &surface, LastPlanes last) {
            (surface.active_end_z - 1) / kBlocks}};
 }
 
-/// Walks from macrocell to macrocell, in those with an active block from block to block, and in
-/// active blocks from cell to cell.
+/// The first hit of a ray in the band of a level. Walks from macrocell to macrocell, in those with
+/// an active block from block to block, and in active blocks from cell to cell.
 inline bool walk_ray(const FrameParams &frame, const HostField &field, const ActiveBox &box,
                      LastPlanes last, const Ray &ray, HitRecord *hit) {
   constexpr int kVoxels = 4 * ISO_MACROCELL_BLOCKS;
   const uint columns = (frame.grid.blocks_x + 3) / 4, rows = (frame.grid.blocks_y + 3) / 4;
-  RayEvent enter;
-  if (!box_entry(&ray, box.begin, box.end, &enter)) return false;
+  RayEvent enter = border_event(frame.band.begin_t), exit = border_event(frame.band.end_t);
+  if (!clip_to_box(&ray, box.begin, box.end, &enter, &exit)) return false;
   GridWalk coarse =
       walk_from(&ray, locate(ray.x, 0, enter, kVoxels, box.first.x, box.final.x),
                 locate(ray.y, 1, enter, kVoxels, box.first.y, box.final.y),
@@ -200,9 +211,9 @@ inline bool walk_ray(const FrameParams &frame, const HostField &field, const Act
         field.masks[static_cast<ulong>(coarse.x) +
                     columns * (static_cast<ulong>(coarse.y) +
                                static_cast<ulong>(rows) * static_cast<ulong>(coarse.z))];
-    RayEvent exit;
     if (mask == 0) {
       exit = walk_exit(&coarse, &ray);
+      if (passes_border(exit, frame.band.end_t)) return false;
     } else {
       GridWalk block = enter_macrocell(ray, coarse, enter, last);
       for (bool left = false; !left; enter = exit) {
@@ -210,6 +221,7 @@ inline bool walk_ray(const FrameParams &frame, const HostField &field, const Act
             trace_block(frame, field, ray, block, enter, last, hit))
           return true;
         exit = walk_exit(&block, &ray);
+        if (passes_border(exit, frame.band.end_t)) return false;
         left = leaves(&block, &coarse, exit) != 0;
         walk_step(&block, &ray, exit, 4, last);
       }
@@ -235,31 +247,116 @@ ISO_OF_ITS_OWN ISO_WIDE_LOOP bool trace_ray_wide(const FrameParams &frame, const
 }
 #endif
 
-/// Gives the hits of a tile smooth gradients.
+/// The side on which a whole block is; unknown if it may have cells that change.
+inline uint side_of_block(const FrameParams &frame, const HostField &field, BlockCoords b) {
+  constexpr uint kBlocks = ISO_MACROCELL_BLOCKS;
+  const uint columns = (frame.grid.blocks_x + 3) / 4, rows = (frame.grid.blocks_y + 3) / 4;
+  const ulong macrocell =
+      b.x / kBlocks + columns * (b.y / kBlocks + static_cast<ulong>(rows) * (b.z / kBlocks));
+  const uint bit = b.x % kBlocks + 4 * (b.y % kBlocks) + 16 * (b.z % kBlocks);
+  if (field.has_gaps || (field.masks[macrocell] >> bit & 1u) != 0) return ISO_SIDE_UNKNOWN;
+  return field.highs[64 * macrocell + bit] - frame.surface.isovalue >= 0.0f ? ISO_SIDE_INSIDE
+                                                                            : ISO_SIDE_OUTSIDE;
+}
+
+/// Decodes a cell.
+inline void open_cell(const HostLevel &level, BlockCoords cell, float *w) {
+  level.field.open(level_block_at(&level.frame, cell.x >> 2, cell.y >> 2, cell.z >> 2));
+  load_corners(level.frame, level.field, static_cast<int>(cell.x), static_cast<int>(cell.y),
+               static_cast<int>(cell.z), w);
+}
+
+/// The side on which a ray is at the border at t, which is in *cell; unknown if it does not come to
+/// the border, or is in a cell without data there.
+inline uint side_at_border(const HostLevel &level, const Ray &ray, LastPlanes last, float t,
+                           BlockCoords *cell) {
+  if (!reaches_border(&ray, last, t)) return ISO_SIDE_UNKNOWN;
+  *cell = region_at_border(&ray, last, t, 1);
+  const uint side =
+      side_of_block(level.frame, level.field, {cell->x >> 2, cell->y >> 2, cell->z >> 2});
+  if (side != ISO_SIDE_UNKNOWN) return side;
+  float w[8];
+  open_cell(level, *cell, w);
+  if (lacks_data(w)) return ISO_SIDE_UNKNOWN;
+  return inside_at(&ray, w, border_event(t), static_cast<int>(cell->x), static_cast<int>(cell->y),
+                   static_cast<int>(cell->z), 0)
+             ? ISO_SIDE_INSIDE
+             : ISO_SIDE_OUTSIDE;
+}
+
+/// The hit of a ray at the border at which its band begins, in that cell.
+inline HitRecord hit_at_border(const HostLevel &level, const Ray &ray, LastPlanes last,
+                               BlockCoords cell) {
+  const FrameParams &frame = level.frame;
+  const int x = static_cast<int>(cell.x), y = static_cast<int>(cell.y),
+            z = static_cast<int>(cell.z);
+  const GridWalk walk = walk_from(&ray, x, y, z, 1, last);
+  const RayEvent exit = walk_exit(&walk, &ray);
+  float w[8];
+  open_cell(level, cell, w);
+  return make_hit(&frame, &ray, w, x, y, z, border_event(frame.band.begin_t),
+                  passes_border(exit, frame.band.end_t) ? border_event(frame.band.end_t) : exit,
+                  0.0f);
+}
+
+ISO_OF_ITS_OWN ISO_WHOLE_LOOP uint side_anywhere(const HostLevel &level, const Ray &ray,
+                                                 LastPlanes last, float t, BlockCoords *cell) {
+  return side_at_border(level, ray, last, t, cell);
+}
+#ifdef ISO_HAS_WIDE_LOOPS
+ISO_OF_ITS_OWN ISO_WIDE_LOOP uint side_wide(const HostLevel &level, const Ray &ray, LastPlanes last,
+                                            float t, BlockCoords *cell) {
+  return side_at_border(level, ray, last, t, cell);
+}
+#endif
+
+/// The first hit of a ray, from band to band. If two levels have it on different sides of the
+/// surface, it hits at their border.
+template <auto kTraceRay, auto kSide>
+inline bool trace_bands(std::span<const HostLevel> levels, uint ray_id, HitRecord *hit) {
+  uint before = ISO_SIDE_UNKNOWN;
+  for (const HostLevel &level : levels) {
+    const LastPlanes last = last_planes(&level.frame);
+    const Ray ray = make_ray(&level.frame, ray_id);
+    BlockCoords cell;
+    if (before != ISO_SIDE_UNKNOWN) {
+      const uint side = kSide(level, ray, last, level.frame.band.begin_t, &cell);
+      if (side != ISO_SIDE_UNKNOWN && side != before) {
+        *hit = hit_at_border(level, ray, last, cell);
+        return true;
+      }
+    }
+    const ActiveBox box = active_box(level.frame.surface, last);
+    if (kTraceRay(level.frame, level.field, box, last, ray, hit)) return true;
+    if (&level != &levels.back()) before = kSide(level, ray, last, level.frame.band.end_t, &cell);
+  }
+  return false;
+}
+
+/// Gives the hits of a tile in a level of detail smooth gradients.
 inline void smooth(const FrameParams &frame, const HostField &field, const RayTile &tile,
                    HitRecord *hits) {
   const LastPlanes last = last_planes(&frame);
   for (uint y = tile.begin_y; y < tile.end_y; ++y) {
     for (uint x = tile.begin_x; x < tile.end_x; ++x) {
       HitRecord *hit = hits + x + frame.view.width * y;
-      if (hit->block_id != ISO_INVALID_ID) smooth_gradient(frame, field, last, hit);
+      if (is_hit_of(frame, *hit)) smooth_gradient(frame, field, last, hit);
     }
   }
 }
 
-template <auto kTraceRay>
-inline uint trace_rays(const FrameParams &frame, const HostField &field, const RayTile &tile,
-                       bool is_smooth, HitRecord *hits) {
-  const LastPlanes last = last_planes(&frame);
-  const ActiveBox box = active_box(frame.surface, last);
+template <auto kTraceRay, auto kSide>
+inline uint trace_levels(std::span<const HostLevel> levels, const RayTile &tile, bool is_smooth,
+                         HitRecord *hits) {
   uint num_hits = 0;
   for (uint y = tile.begin_y; y < tile.end_y; ++y) {
     for (uint x = tile.begin_x; x < tile.end_x; ++x) {
-      const uint ray_id = x + frame.view.width * y;
-      num_hits += kTraceRay(frame, field, box, last, make_ray(&frame, ray_id), hits + ray_id);
+      const uint ray_id = x + levels.front().frame.view.width * y;
+      num_hits += trace_bands<kTraceRay, kSide>(levels, ray_id, hits + ray_id);
     }
   }
-  if (is_smooth && num_hits > 0) smooth(frame, field, tile, hits);
+  if (!is_smooth || num_hits == 0) return num_hits;
+  for (const HostLevel &level : levels) smooth(level.frame, level.field, tile, hits);
   return num_hits;
 }
 
@@ -284,12 +381,12 @@ inline void ambient(const FrameParams &frame, const HostField &field, const RayT
   for (uint y = tile.begin_y; y < tile.end_y; ++y) {
     for (uint x = tile.begin_x; x < tile.end_x; ++x) {
       const uint ray_id = x + frame.view.width * y;
-      if (hits[ray_id].t == INFINITY) continue;
-      const HitRecord placed = placed_hit(&frame, 0, hits[ray_id]);
+      if (!is_hit_of(frame, hits[ray_id])) continue;
+      const HitRecord placed = placed_hit(&frame, rays.level, hits[ray_id]);
       const uint pattern = ambient_pattern(&frame, ray_id);
       uint num_open = 0;
       for (uint k = 0; k < rays.num_rays; ++k) {
-        const GivenRay given = ambient_ray(&frame, &rays.params, placed, ray_id,
+        const GivenRay given = ambient_ray(rays.seen, &rays.params, placed, ray_id,
                                            rays.directions[k * ISO_AMBIENT_PATTERNS + pattern]);
         num_open += !kTraceRay(frame, field, box, last, make_given_ray(given), &met);
       }
@@ -319,9 +416,10 @@ ISO_WHOLE_LOOP void ranges_anywhere(const EncodedBlock &block, BlockRange *parts
 ISO_WHOLE_LOOP ulong inside_anywhere(const float *values, float isovalue) {
   return inside(values, isovalue);
 }
-ISO_WHOLE_LOOP uint trace_rays_anywhere(const FrameParams &frame, const HostField &field,
-                                        const RayTile &tile, bool is_smooth, HitRecord *hits) {
-  return trace_rays<trace_ray_anywhere>(frame, field, tile, is_smooth, hits);
+ISO_OF_ITS_OWN ISO_WHOLE_LOOP uint trace_levels_anywhere(std::span<const HostLevel> levels,
+                                                         const RayTile &tile, bool is_smooth,
+                                                         HitRecord *hits) {
+  return trace_levels<trace_ray_anywhere, side_anywhere>(levels, tile, is_smooth, hits);
 }
 ISO_WHOLE_LOOP void cast_anywhere(const FrameParams &frame, const HostField &field,
                                   const IndexRay *rays, uint num_rays, bool is_smooth,
@@ -337,6 +435,14 @@ ISO_WHOLE_LOOP void shade_anywhere(const FrameParams &frame, const ShadeParams &
                                    uint samples, uint row, const HitRecord *hits,
                                    const uchar *open_counts, uint num_ambient, std::uint8_t *rgb) {
   shade(frame, params, samples, row, hits, open_counts, num_ambient, rgb);
+}
+
+/// One level is a special case of several.
+template <auto kTraceLevels>
+uint trace_rays(const FrameParams &frame, const HostField &field, const RayTile &tile,
+                bool is_smooth, HitRecord *hits) {
+  const HostLevel level{frame, field};
+  return kTraceLevels({&level, 1}, tile, is_smooth, hits);
 }
 
 #ifdef ISO_HAS_WIDE_LOOPS
@@ -363,9 +469,10 @@ ISO_WIDE_LOOP uint trace_wide(const FrameParams &frame, const HostField &field, 
   if (is_smooth && num_hits > 0) smooth(frame, field, tile, hits);
   return num_hits;
 }
-ISO_WIDE_LOOP uint trace_rays_wide(const FrameParams &frame, const HostField &field,
-                                   const RayTile &tile, bool is_smooth, HitRecord *hits) {
-  return trace_rays<trace_ray_wide>(frame, field, tile, is_smooth, hits);
+ISO_OF_ITS_OWN ISO_WIDE_LOOP uint trace_levels_wide(std::span<const HostLevel> levels,
+                                                    const RayTile &tile, bool is_smooth,
+                                                    HitRecord *hits) {
+  return trace_levels<trace_ray_wide, side_wide>(levels, tile, is_smooth, hits);
 }
 ISO_WIDE_LOOP void cast_wide(const FrameParams &frame, const HostField &field, const IndexRay *rays,
                              uint num_rays, bool is_smooth, HitRecord *hits) {
@@ -402,13 +509,15 @@ bool is_wide() {
 #endif
 
 constexpr HostLoops kLoops[] = {
-    {decode_anywhere, ranges_anywhere, inside_anywhere, trace_rays_anywhere, trace_rays_anywhere,
-     cast_anywhere, ambient_anywhere, shade_anywhere},
+    {decode_anywhere, ranges_anywhere, inside_anywhere, trace_rays<trace_levels_anywhere>,
+     trace_rays<trace_levels_anywhere>, trace_levels_anywhere, cast_anywhere, ambient_anywhere,
+     shade_anywhere},
 #ifdef ISO_HAS_WIDE_LOOPS
-    {decode_anywhere, ranges_anywhere, inside_anywhere, trace_sse4, trace_rays_anywhere,
-     cast_anywhere, ambient_anywhere, shade_anywhere},
-    {decode_wide, ranges_wide, inside_wide, trace_wide, trace_rays_wide, cast_wide, ambient_wide,
-     shade_wide},
+    {decode_anywhere, ranges_anywhere, inside_anywhere, trace_sse4,
+     trace_rays<trace_levels_anywhere>, trace_levels_anywhere, cast_anywhere, ambient_anywhere,
+     shade_anywhere},
+    {decode_wide, ranges_wide, inside_wide, trace_wide, trace_rays<trace_levels_wide>,
+     trace_levels_wide, cast_wide, ambient_wide, shade_wide},
 #endif
 };
 

@@ -50,7 +50,11 @@ class BlockMaker {
 struct HostField {
   const float *values;    ///< [block][64] x + 4y + 16z; of decoded blocks
   const ulong *changing;  ///< [open block] bit x + 4y + 16z: do the corners of the cell differ?
-  const ulong *masks;     ///< [macrocell] bit x + 4y + 16z: has the block a cell that does?
+  const ulong *masks;     ///< [macrocell] bit x + 4y + 16z: may the block have a cell that does?
+  /// [macrocell][64] largest value of the block's cells; of blocks without a bit in masks, it is on
+  /// the side of all of them.
+  const float *highs;
+  bool has_gaps;                      ///< voxels without data
   const std::atomic<uchar> *decoded;  ///< [block] kDecoded: its values are there
   const std::atomic<uchar> *opened;   ///< [block] selection: it is open
   uchar selection;                    ///< the isovalue that blocks are open for
@@ -69,15 +73,23 @@ struct HostField {
   }
 };
 
+/// A level of detail that draws the rays of a frame in its band.
+struct HostLevel {
+  FrameParams frame;  ///< its surface's box is that of the field's active blocks
+  HostField field;
+};
+
 struct RayTile {
   uint begin_x, begin_y, end_x, end_y;  ///< of the frame's rays
 };
 
-/// The ambient rays of a frame's hits.
+/// The ambient rays of a frame's hits in one level of detail.
 struct AmbientRays {
   AmbientParams params;
   const AmbientDirection *directions;  ///< [num_rays][ISO_AMBIENT_PATTERNS]
   uint num_rays;                       ///< of each hit
+  const FrameParams *seen;             ///< the frame of the finest level that draws
+  uint level;                          ///< of the hits, counted from that one
 };
 
 struct HostLoops {
@@ -100,13 +112,18 @@ struct HostLoops {
   /// The same, ray by ray; trace() is compared with it.
   uint (*trace_rays)(const FrameParams &frame, const HostField &field, const RayTile &tile,
                      bool is_smooth, HitRecord *hits);
+  /// The same for a frame that several levels of detail draw, the finest first, each its band.
+  uint (*trace_levels)(std::span<const HostLevel> levels, const RayTile &tile, bool is_smooth,
+                       HitRecord *hits);
   /// Writes the hits of rays into hits [num_rays], only for rays that hit something.
   ///
   /// frame      as for trace(); its view is not used
   void (*cast)(const FrameParams &frame, const HostField &field, const IndexRay *rays,
                uint num_rays, bool is_smooth, HitRecord *hits);
-  /// Counts the ambient rays of a tile's hits that meet nothing, into open_counts
-  /// [height * width].
+  /// Counts the ambient rays of a tile's hits in a level of detail that meet nothing in that level,
+  /// into open_counts [height * width].
+  ///
+  /// frame      the level's, as for trace(), with a band without ends
   void (*ambient)(const FrameParams &frame, const HostField &field, const RayTile &tile,
                   const AmbientRays &rays, const HitRecord *hits, uchar *open_counts);
   /// Shades a row of the picture of the frame's hits [height * width].

@@ -1,3 +1,5 @@
+// Ids of blocks count on through all levels of detail. Before anything is included.
+#define ISO_LEVELS 1
 #include "core/host/host_packets.hpp"
 
 #ifdef ISO_HAS_PACKETS

@@ -1,3 +1,5 @@
+// Ids of blocks count on through all levels of detail. Before anything is included.
+#define ISO_LEVELS 1
 // host_packets.cpp for processors with SSE4.1 alone.
 #include "core/host/host_packets.hpp"
 

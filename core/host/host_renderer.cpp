@@ -13,6 +13,7 @@
 #include "core/platform/memory.hpp"
 #include "core/view/detail.hpp"
 #include "kernels_cl/portable/cell_intersect.h"
+#include "kernels_cl/portable/kept_pixel.h"
 
 namespace isowave::core {
 
@@ -30,8 +31,8 @@ std::uint64_t mebibytes(std::uint64_t bytes) {
 }
 
 /// The memory limit, if the volume can be drawn within it.
-std::uint64_t checked_limit(const VolumeInfo &info, const HostRendererOptions &options) {
-  const std::uint64_t needed = HostBlocks::least_bytes(info),
+std::uint64_t checked_limit(const CompressedVolume &volume, const HostRendererOptions &options) {
+  const std::uint64_t needed = HostLevels::least_bytes(volume),
                       limit = options.memory_limit != 0 ? options.memory_limit
                                                         : platform::host_memory() / 4;
   if (needed <= limit) return limit;
@@ -56,12 +57,14 @@ Count rounded_up(Count count, std::uint32_t unit) {
 
 HostRenderer::HostRenderer(const CompressedVolume &volume, const HostRendererOptions &options)
     : info_(volume.info),
+      abilities_(abilities_of(volume)),
       num_threads_(options.num_threads),
-      blocks_(volume, checked_limit(volume.info, options), options.num_threads) {}
+      levels_(volume, checked_limit(volume, options), options.num_threads) {}
 
-Abilities HostRenderer::all_abilities() {
+Abilities HostRenderer::abilities_of(const CompressedVolume &volume) {
   Abilities abilities;
-  abilities.given_rays = true;
+  abilities.levels = !volume.coarser_levels.empty();
+  abilities.fewer_planes = abilities.bounds = abilities.given_rays = abilities.kept_picture = true;
   return abilities;
 }
 
@@ -69,18 +72,19 @@ FrameStats HostRenderer::render(const FrameRequest &request) {
   const auto begin = std::chrono::steady_clock::now();
   check(request, abilities());
   const ImageSize size = size_of(request, abilities());
-  FrameParams frame = make_frame_params(info_, request.camera, size, request.isovalue);
-  blocks_.select(request.isovalue);
-  frame.surface = blocks_.surface();
-  frame.screen = make_screen_box(frame);
-  frame_ = frame;
+  const std::vector<FrameParams> frames = make_level_frames(levels_.infos(), request.camera, size,
+                                                            request.isovalue, request.voxel_pixels);
+  const std::vector<HostLevel> drawing = levels_.open(frames, request.voxel_error, request.bound);
+  frame_ = frames.front();
   size_ = size;
-  normals_ = request.normals;
   open_ = {};
   FrameStats stats;
+  stats.first_level =
+      static_cast<std::size_t>(std::ranges::find_if(frames, draws) - frames.begin());
+  stats.last_level = stats.first_level + drawing.size() - 1;
   try {
-    draw_bands(request, stats);
-    if (request.ambient_rays != 0 && !stats.cancelled) add_ambient(request, stats);
+    draw_bands(request, drawing, stats);
+    if (request.ambient_rays != 0 && !stats.cancelled) add_ambient(request, drawing, stats);
   } catch (...) {
     hits_.clear();
     throw;
@@ -93,7 +97,8 @@ FrameStats HostRenderer::render(const FrameRequest &request) {
 /// Band by band, so that the picture so far can be shown; without on_pass, one has all. Each tile
 /// first gets no hits, while it is in the processor's cache; what on_pass may see of others before
 /// that, too.
-void HostRenderer::draw_bands(const FrameRequest &request, FrameStats &stats) {
+void HostRenderer::draw_bands(const FrameRequest &request, std::span<const HostLevel> drawing,
+                              FrameStats &stats) {
   const std::size_t num_rays = std::size_t{frame_.view.width} * frame_.view.height;
   if (request.on_pass) {
     hits_.assign(num_rays, no_hit());
@@ -101,7 +106,8 @@ void HostRenderer::draw_bands(const FrameRequest &request, FrameStats &stats) {
     hits_.resize(num_rays);
   }
   std::atomic<std::uint64_t> num_hits = 0;
-  const HostField field = blocks_.field();
+  const HostLevel &first = drawing.front();
+  const bool is_smooth = request.normals == Normals::kSmooth;
   stats.cancelled = !for_bands(
       request.on_pass, request.ambient_rays != 0,
       [&](const RayTile &tile, bool is_alone) {
@@ -109,35 +115,45 @@ void HostRenderer::draw_bands(const FrameRequest &request, FrameStats &stats) {
           const auto row = hits_.begin() + static_cast<std::ptrdiff_t>(y * frame_.view.width);
           std::fill(row + tile.begin_x, row + tile.end_x, no_hit());
         }
-        const auto trace = is_alone ? host_loops().trace_rays : host_loops().trace;
-        num_hits += trace(frame_, field, within(tile, frame_.screen), normals_ == Normals::kSmooth,
-                          hits_.data());
+        const RayTile part = within(tile, first.frame.screen);
+        num_hits +=
+            is_alone || drawing.size() > 1
+                ? host_loops().trace_levels(drawing, part, is_smooth, hits_.data())
+                : host_loops().trace(first.frame, first.field, part, is_smooth, hits_.data());
       },
-      [&](double percent) {
+      [&](std::uint32_t rows) {
         PassStats pass;
         pass.counts.hit_count = static_cast<uint>(num_hits.exchange(0));
-        pass.completed_percent = percent;
+        pass.counts.next_active_count = frame_.view.width * (frame_.view.height - rows);
+        pass.completed_percent = 100.0 * rows / frame_.view.height;
         stats.rays_hit += pass.counts.hit_count;
         stats.passes.push_back(pass);
         return pass;
       });
 }
 
-/// All rays of each hit at once: bands that are not there yet show all of the sky.
-void HostRenderer::add_ambient(const FrameRequest &request, FrameStats &stats) {
+/// All rays of each hit at once: bands that are not there yet show all of the sky. Each ray stays
+/// in the level of detail of its hit.
+void HostRenderer::add_ambient(const FrameRequest &request, std::span<const HostLevel> drawing,
+                               FrameStats &stats) {
   const auto begin = std::chrono::steady_clock::now();
   const std::vector<AmbientDirection> directions = make_ambient_directions(request.ambient_rays);
-  const AmbientRays rays{make_ambient_params(info_), directions.data(), request.ambient_rays};
+  const AmbientParams params = make_ambient_params(levels_.infos()[stats.first_level]);
+  const FrameParams &seen = drawing.front().frame;
+  std::vector<HostLevel> whole(drawing.begin(), drawing.end());
+  for (HostLevel &level : whole) level.frame.band = {.begin_t = 0, .end_t = INFINITY};
   open_.counts.assign(hits_.size(), static_cast<uchar>(request.ambient_rays));
   open_.num_ambient = request.ambient_rays;
-  const HostField field = blocks_.field();
   stats.cancelled = !for_bands(
       request.on_pass, false,
       [&](const RayTile &tile, bool) {
-        host_loops().ambient(frame_, field, within(tile, frame_.screen), rays, hits_.data(),
-                             open_.counts.data());
+        for (uint level = 0; level < whole.size(); ++level) {
+          const AmbientRays rays{params, directions.data(), request.ambient_rays, &seen, level};
+          host_loops().ambient(whole[level].frame, whole[level].field, within(tile, seen.screen),
+                               rays, hits_.data(), open_.counts.data());
+        }
       },
-      [&](double) {
+      [&](std::uint32_t) {
         PassStats pass;
         pass.completed_percent = 100;
         ++stats.ambient.passes;
@@ -147,8 +163,8 @@ void HostRenderer::add_ambient(const FrameRequest &request, FrameStats &stats) {
 }
 
 /// Calls draw(tile, is_alone), as HostBlocks::run() does, for the tiles of all of the frame's rays,
-/// in bands of whole rows of pixels from the top; after each band, on_pass(after(percent of the
-/// rows that are done)). Returns false if on_pass says to stop, and there is more to draw: bands,
+/// in bands of whole rows of pixels from the top; after each band, on_pass(after(rows that are
+/// done)). Returns false if on_pass says to stop, and there is more to draw: bands,
 /// or what follows.
 template <class Draw, class After>
 bool HostRenderer::for_bands(const OnPass &on_pass, bool more_follows, Draw draw, After after) {
@@ -160,7 +176,7 @@ bool HostRenderer::for_bands(const OnPass &on_pass, bool more_follows, Draw draw
               : rows;
   for (std::uint32_t row = 0; row < rows; row += band) {
     const std::uint32_t end_row = std::min(rows - row, band) + row;
-    blocks_.run(
+    levels_.room().run(
         std::uint64_t{columns} * rounded_up(end_row - row, tile_rows),
         [&](std::uint64_t tile, bool is_alone) {
           const auto x = static_cast<std::uint32_t>(tile % columns * kTileRays),
@@ -168,7 +184,7 @@ bool HostRenderer::for_bands(const OnPass &on_pass, bool more_follows, Draw draw
           draw(RayTile{x, y, std::min(x + kTileRays, width), std::min(y + tile_rows, end_row)},
                is_alone);
         });
-    const PassStats pass = after(100.0 * end_row / rows);
+    const PassStats pass = after(end_row);
     if (on_pass && !on_pass(pass) && (end_row < rows || more_follows)) return false;
   }
   return true;
@@ -180,12 +196,11 @@ std::vector<HitRecord> HostRenderer::cast_rays(std::span<const WorldRay> rays, f
   const std::vector<IndexRay> index_rays = make_index_rays(info_, rays);
   FrameParams frame = make_grid_params(info_);
   frame.view.t_scale = 1;
-  frame.surface.isovalue = isovalue;
-  blocks_.select(isovalue);
-  frame.surface = blocks_.surface();
+  HostBlocks &blocks = levels_.open_finest(isovalue);
+  frame.surface = blocks.surface();
   std::vector<HitRecord> hits(rays.size(), no_hit());
-  const HostField field = blocks_.field();
-  blocks_.run(rounded_up(rays.size(), kRunRays), [&](std::uint64_t run, bool) {
+  const HostField field = blocks.field();
+  blocks.run(rounded_up(rays.size(), kRunRays), [&](std::uint64_t run, bool) {
     const std::size_t begin = run * kRunRays;
     host_loops().cast(frame, field, index_rays.data() + begin,
                       static_cast<uint>(std::min<std::size_t>(kRunRays, rays.size() - begin)),
@@ -200,13 +215,43 @@ Camera HostRenderer::camera(std::span<const float> isovalues, std::optional<Imag
   std::optional<BlockBox> box;
   for (const float isovalue : isovalues) {
     if (std::isnan(isovalue)) throw Error("the isovalue is NaN: give a number");
-    const std::optional<BlockBox> blocks = blocks_.rounded_box(isovalue);
+    const std::optional<BlockBox> blocks = levels_.finest().rounded_box(isovalue);
     if (!blocks) continue;
     if (!box) box = blocks;
     box->begin = glm::min(box->begin, blocks->begin);
     box->end = glm::max(box->end, blocks->end);
   }
   return surface_camera(info_, box, of_picture);
+}
+
+void HostRenderer::keep_picture() {
+  check_has_picture();
+  kept_ = hits_;
+  kept_size_ = size_;
+}
+
+void HostRenderer::enlarge_kept(const FrameRequest &request) {
+  core::check(request, abilities());
+  const ImageSize size = size_of(request, abilities());
+  frame_ = make_frame_params(info_, request.camera, size, request.isovalue);
+  size_ = size;
+  open_ = {};
+  hits_.resize(size.num_rays());
+  show_kept(true);
+}
+
+/// Fills the picture from the kept one, enlarged: rays without a hit, or all.
+void HostRenderer::show_kept(bool everywhere) {
+  check_has_picture();
+  if (kept_.empty()) throw Error("there is no picture: none was kept");
+  parallel_for(frame_.view.height, num_threads_, [&](std::uint64_t row, std::uint32_t) {
+    const auto first = static_cast<uint>(row * frame_.view.width);
+    for (uint ray = first; ray < first + frame_.view.width; ++ray) {
+      if (!everywhere && hits_[ray].t < INFINITY) continue;
+      hits_[ray] =
+          kept_[kept_pixel(&frame_.view, kept_size_.ray_columns(), kept_size_.ray_rows(), ray)];
+    }
+  });
 }
 
 void HostRenderer::check_has_picture() const {

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "core/frame/renderer.hpp"
-#include "core/host/host_blocks.hpp"
+#include "core/host/host_levels.hpp"
 
 namespace isowave::core {
 
@@ -33,9 +33,10 @@ class HostRenderer : public Renderer {
   explicit HostRenderer(const CompressedVolume &volume, const HostRendererOptions &options = {});
   explicit HostRenderer(CompressedVolume &&, const HostRendererOptions & = {}) = delete;
 
-  static Abilities all_abilities();
-  Abilities abilities() const override { return all_abilities(); }
-  std::vector<VolumeInfo> levels() const override { return {info_}; }
+  /// Abilities of a renderer of that volume.
+  static Abilities abilities_of(const CompressedVolume &volume);
+  Abilities abilities() const override { return abilities_; }
+  std::vector<VolumeInfo> levels() const override { return levels_.infos(); }
 
   /// Draws one frame. on_pass is called after each band of rows, from the top, by the calling
   /// thread; rows that were not drawn have no hits.
@@ -52,27 +53,36 @@ class HostRenderer : public Renderer {
   const OpenCounts &open() const { return open_; }
   FrameArrays fetch(const WantedArrays &wanted, const Appearance &appearance) override;
 
+  void keep_picture() override;
+  void fill_from_kept() override { show_kept(false); }
+  void enlarge_kept(const FrameRequest &request) override;
+
   /// Forgets all decoded blocks, and keeps their memory for other blocks.
-  void clear_cache() override { blocks_.forget(); }
-  std::uint64_t num_decoded_blocks() const { return blocks_.num_decoded(); }  ///< from the start
+  void clear_cache() override { levels_.forget(); }
+  std::uint64_t num_decoded_blocks() const { return levels_.num_decoded(); }  ///< from the start
   /// Memory at present: value ranges and decoded blocks, without pictures.
-  std::uint64_t memory_bytes() const override { return blocks_.bytes(); }
+  std::uint64_t memory_bytes() const override { return levels_.bytes(); }
 
  private:
   void check_has_picture() const;
-  void draw_bands(const FrameRequest &request, FrameStats &stats);
-  void add_ambient(const FrameRequest &request, FrameStats &stats);
+  void show_kept(bool everywhere);
+  void draw_bands(const FrameRequest &request, std::span<const HostLevel> drawing,
+                  FrameStats &stats);
+  void add_ambient(const FrameRequest &request, std::span<const HostLevel> drawing,
+                   FrameStats &stats);
   template <class Draw, class After>
   bool for_bands(const OnPass &on_pass, bool more_follows, Draw draw, After after);
 
   VolumeInfo info_;
+  Abilities abilities_;
   std::uint32_t num_threads_;
-  HostBlocks blocks_;
-  FrameParams frame_{};
+  HostLevels levels_;
+  FrameParams frame_{};  ///< of the finest level, for shading
   ImageSize size_;
-  Normals normals_ = Normals::kSmooth;
   std::vector<HitRecord> hits_;
   OpenCounts open_;
+  std::vector<HitRecord> kept_;
+  ImageSize kept_size_;
   HostMemory memory_;
 };
 

@@ -6,6 +6,7 @@
 #define ISOWAVE_LEVEL_BORDERS_H
 
 #include "block_walk.h"
+#include "portable/level_border.h"
 #include "portable/no_data.h"
 
 /// The level of detail that has the block with this id, of those that draw a frame, frames
@@ -32,13 +33,8 @@ ISO_INLINE uint side_of_block(const FrameParams *frame, global const uint *macro
 /// is in just behind it.
 ISO_INLINE int block_at_border(const FrameParams *frame, const Ray *ray, float t, BlockCoords *b) {
   const LastPlanes last = last_planes(frame);
-  LastPlanes zero;
-  RayEvent enter = border_event(t), exit = border_event(INFINITY);
-  zero.x = zero.y = zero.z = 0;
-  if (!clip_to_box(ray, zero, last, &enter, &exit) || enter.axis != ISO_AXIS_START) return 0;
-  b->x = (uint)locate(ray->x, 0, enter, 4, 0, (last.x - 1) / 4);
-  b->y = (uint)locate(ray->y, 1, enter, 4, 0, (last.y - 1) / 4);
-  b->z = (uint)locate(ray->z, 2, enter, 4, 0, (last.z - 1) / 4);
+  if (!reaches_border(ray, last, t)) return 0;
+  *b = region_at_border(ray, last, t, 4);
   return is_own(frame, *b);
 }
 
@@ -48,15 +44,11 @@ ISO_INLINE int block_at_border(const FrameParams *frame, const Ray *ray, float t
 ///          ISO_NO_DATA is 0, or no_data_begin is ISO_INVALID_ID
 ISO_INLINE int lacks_data_at_border(const FrameParams *frame, global const uint *no_data,
                                     uint no_data_begin, const Ray *ray, float t) {
-  const LastPlanes last = last_planes(frame);
-  const RayEvent border = border_event(t);
-  uint x, y, z;
   if (!ISO_NO_DATA || no_data_begin == ISO_INVALID_ID) return 0;
-  x = (uint)locate(ray->x, 0, border, 1, 0, last.x - 1);
-  y = (uint)locate(ray->y, 1, border, 1, 0, last.y - 1);
-  z = (uint)locate(ray->z, 2, border, 1, 0, last.z - 1);
+  const BlockCoords cell = region_at_border(ray, last_planes(frame), t, 1);
   for (uint corner = 0; corner < 8; ++corner) {
-    const uint vx = x + (corner & 1), vy = y + (corner >> 1 & 1), vz = z + (corner >> 2);
+    const uint vx = cell.x + (corner & 1), vy = cell.y + (corner >> 1 & 1),
+               vz = cell.z + (corner >> 2);
     const uint block = frame->place.ranges_begin + level_block_at(frame, vx >> 2, vy >> 2, vz >> 2);
     const uint voxel = (vx & 3) + 4 * (vy & 3) + 16 * (vz & 3);
     if ((no_data_mask(no_data + no_data_begin, block) >> voxel & 1u) != 0) return 1;

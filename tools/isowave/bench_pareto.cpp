@@ -16,6 +16,7 @@
 #include "core/accuracy/choose_detail.hpp"
 #include "core/accuracy/compare.hpp"
 #include "core/accuracy/flip.hpp"
+#include "core/accuracy/with_choices.hpp"
 #include "core/base/error.hpp"
 #include "core/base/parallel_for.hpp"
 #include "core/io/file_name.hpp"

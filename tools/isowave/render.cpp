@@ -12,6 +12,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/api/choices.hpp"
 #include "core/api/device_renderer.hpp"
 #include "core/api/frame_parts.hpp"
 #include "core/api/renderer_implementation.hpp"

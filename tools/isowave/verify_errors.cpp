@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "core/accuracy/choose_detail.hpp"
+#include "core/accuracy/with_choices.hpp"
 #include "core/base/error.hpp"
 #include "core/render/device_renderer.hpp"
 #include "core/zfp/isovalue.hpp"

@@ -18,8 +18,8 @@ struct HostRendererOptions {
 };
 
 /// Makes a renderer that decodes the blocks that rays come to, and keeps them in host memory. It
-/// draws requests without voxel_pixels, voxel_error, bound, max_surface_error, time_budget_ms and
-/// want_bounds. Reads the whole volume for its value ranges, and keeps the volume alive.
+/// draws all that a device's renderer with all of its options draws, with the same bits. Reads the
+/// whole volume for its value ranges, and keeps the volume alive.
 ///
 /// Throws  Error: no volume; a memory limit that is too small; a file that cannot be read
 Renderer make_host_renderer(std::shared_ptr<const Volume> volume,

@@ -352,7 +352,7 @@ class Renderer:
 
 
 def host_renderer(volume: Voxels) -> Renderer:
-    """Makes a Renderer that draws on the host, in full detail, in a quarter of its memory at most.
+    """Makes a Renderer that draws on the host, in a quarter of its memory at most.
 
     Raises
     ------
@@ -360,6 +360,6 @@ def host_renderer(volume: Voxels) -> Renderer:
         The memory is not enough.
     """
     renderer = Renderer.__new__(Renderer)
-    can = {name: name == "rays" for name in CAPABILITIES}
+    can = dict.fromkeys(CAPABILITIES, True)
     renderer._hold(volume, _core.host_renderer(volume._core, 0), (1280, 720), can)
     return renderer

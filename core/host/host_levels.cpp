@@ -1,0 +1,70 @@
+#include "core/host/host_levels.hpp"
+
+#include "core/view/detail.hpp"
+#include "core/zfp/stated_errors.hpp"
+
+namespace isowave::core {
+
+std::uint64_t HostLevels::least_bytes(const CompressedVolume &volume) {
+  std::uint64_t sum = HostBlocks::ray_bytes();
+  for (const CompressedVolume *level : levels_of(volume, true))
+    sum += HostBlocks::bytes(level->info);
+  return sum;
+}
+
+HostLevels::HostLevels(const CompressedVolume &volume, std::uint64_t memory_limit,
+                       std::uint32_t num_threads)
+    : volumes_(levels_of(volume, true)),
+      infos_(level_infos(volume, true)),
+      num_threads_(num_threads),
+      room_(memory_limit, num_threads),
+      blocks_(volumes_.size()) {
+  blocks_of(0);
+}
+
+HostBlocks &HostLevels::blocks_of(std::size_t level) {
+  std::unique_ptr<HostBlocks> &blocks = blocks_[level];
+  if (!blocks) blocks = std::make_unique<HostBlocks>(*volumes_[level], room_, num_threads_);
+  return *blocks;
+}
+
+std::vector<HostLevel> HostLevels::open(std::span<const FrameParams> frames, double voxel_error,
+                                        FieldBound bound) {
+  // Bounds need the range of values, which a file may get wrong.
+  if (bound != FieldBound::kNone && volumes_[0]->errors_are_stated)
+    check_value_range(*volumes_[0], finest().extremes());
+  std::vector<HostLevel> levels;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    if (!draws(frames[i])) continue;
+    HostBlocks &blocks = blocks_of(i);
+    blocks.decode_as(
+        {*volumes_[i], i == 0, voxel_error_of(voxel_error, i), bound, volumes_[0]->value_range});
+    blocks.select(frames[i].surface.isovalue);
+    levels.push_back({frames[i], blocks.field()});
+    levels.back().frame.surface = blocks.surface();
+  }
+  // If there are several bands, a ray may begin at a border that lies outside the box.
+  if (levels.size() == 1) levels[0].frame.screen = make_screen_box(levels[0].frame);
+  return levels;
+}
+
+HostBlocks &HostLevels::open_finest(float isovalue) {
+  HostBlocks &blocks = blocks_of(0);
+  blocks.decode_as(HostValues(*volumes_[0]));
+  blocks.select(isovalue);
+  return blocks;
+}
+
+void HostLevels::forget() {
+  for (const auto &blocks : blocks_) {
+    if (blocks) blocks->forget();
+  }
+}
+
+std::uint64_t HostLevels::num_decoded() const {
+  std::uint64_t sum = 0;
+  for (const auto &blocks : blocks_) sum += blocks ? blocks->num_decoded() : 0;
+  return sum;
+}
+
+}  // namespace isowave::core

@@ -1,0 +1,60 @@
+#pragma once
+// The levels of detail of a compressed volume, for rays on the host.
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "core/host/host_blocks.hpp"
+
+namespace isowave::core {
+
+/// The levels share memory. A coarser level is made when a frame first needs it.
+class HostLevels {
+ public:
+  /// The least limit of the memory: value ranges of all levels, and room for the blocks that a
+  /// single ray needs at a time.
+  static std::uint64_t least_bytes(const CompressedVolume &volume);
+
+  /// volume        must outlive this
+  /// memory_limit  bound on bytes(); at least least_bytes()
+  /// num_threads   0: one per processor
+  /// Throws        Error: as HostBlocks
+  HostLevels(const CompressedVolume &volume, std::uint64_t memory_limit, std::uint32_t num_threads);
+
+  /// Grids of all levels, the finest first.
+  const std::vector<VolumeInfo> &infos() const { return infos_; }
+  const HostBlocks &finest() const { return *blocks_.front(); }
+
+  /// Prepares the levels that draw a frame.
+  ///
+  /// frames       see make_level_frames()
+  /// voxel_error  FrameRequest::voxel_error
+  /// bound        FrameRequest::bound
+  /// Returns  the drawing levels, with their surfaces; the screen box of the first is the rays'.
+  /// They
+  ///          stay valid until the next call of this or of HostBlocks::select()
+  /// Throws   Error: as HostBlocks and value_offset(); the file contradicts itself
+  std::vector<HostLevel> open(std::span<const FrameParams> frames, double voxel_error = 0,
+                              FieldBound bound = FieldBound::kNone);
+  /// Prepares the finest level for rays of any origin: its field is that of all bit planes.
+  HostBlocks &open_finest(float isovalue);
+
+  HostRoom &room() { return room_; }
+  void forget();
+  std::uint64_t num_decoded() const;
+  /// Memory at present.
+  std::uint64_t bytes() const { return room_.bytes(); }
+
+ private:
+  HostBlocks &blocks_of(std::size_t level);
+
+  std::vector<const CompressedVolume *> volumes_;
+  std::vector<VolumeInfo> infos_;
+  std::uint32_t num_threads_;
+  HostRoom room_;
+  std::vector<std::unique_ptr<HostBlocks>> blocks_;  ///< [level] null: not made yet
+};
+
+}  // namespace isowave::core
