@@ -1,5 +1,5 @@
-// Hit buffer -> picture on the host: shade.cl and the read-back; the wall time holds the host's
-// part as well.
+// Hit buffer -> picture, depth and normals on the host: shade.cl and the copy; the wall time holds
+// the host's part as well.
 
 #include "bench/frame_rig.hpp"
 #include "bench/scenes.hpp"
@@ -22,7 +22,9 @@ struct ShadeInput : FrameRig {
                              shade_scalar(params, appearance, rays.hits.read()).pixels),
           "shaded pixels");
   }
-  FrameArrays run() { return shade({.picture = true}, appearance, {}, rays, 1); }
+  FrameArrays run(const WantedArrays &wanted = {.picture = true}) {
+    return shade(wanted, appearance, {}, rays, 1);
+  }
 
   ShadeParams appearance;
   Shade shade;
@@ -36,8 +38,30 @@ void shade_hits(benchmark::State &state) {
       [&] { benchmark::DoNotOptimize(in.run()); });
 }
 
+/// bytes: of one ray's values.
+void fetch(benchmark::State &state, const WantedArrays &wanted, double read_bytes, double bytes) {
+  auto &in = input<ShadeInput>(state.range(0));
+  const auto rays = static_cast<double>(in.rays.num_rays);
+  measure(
+      state, {rays, rays * (read_bytes + 2 * bytes)}, [] {},
+      [&] { benchmark::DoNotOptimize(in.run(wanted)); });
+}
+
+void depth_of_hits(benchmark::State &state) {
+  fetch(state, {.depth = true}, sizeof(float), sizeof(float));
+}
+void normals_of_hits(benchmark::State &state) {
+  fetch(state, {.normals = true}, 4 * sizeof(float), 3 * sizeof(float));
+}
+
 const bool kRegistered = [] {
   stage_benchmark("shade", shade_hits)
+      ->ArgName("width")
+      ->ArgsProduct({{kWidths.begin(), kWidths.end()}});
+  stage_benchmark("shade/depth", depth_of_hits)
+      ->ArgName("width")
+      ->ArgsProduct({{kWidths.begin(), kWidths.end()}});
+  stage_benchmark("shade/normals", normals_of_hits)
       ->ArgName("width")
       ->ArgsProduct({{kWidths.begin(), kWidths.end()}});
   return true;

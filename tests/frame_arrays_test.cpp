@@ -10,7 +10,6 @@
 #include <cstring>
 
 #include "core/host/host_renderer.hpp"
-#include "core/view/detail.hpp"
 #include "core/volume/world_positions.hpp"
 #include "reference/twin_renderer.hpp"
 #include "tests/frame_scene.hpp"
@@ -131,28 +130,6 @@ TEST_P(FrameArraysOnDevice, SmallArraysOutliveTheRenderer) {
   for (std::size_t view = 0; view < kept.size(); ++view)
     EXPECT_EQ(kept[view].picture.copy(), pictures[view].pixels);
   EXPECT_NE(pictures[0].pixels, pictures[1].pixels);
-}
-
-/// Hits of levels of detail are where the finest level's voxels are.
-TEST(FrameArrays, CellsOfLevelsAreFoundByTheirBlocks) {
-  const std::vector<VolumeInfo> levels{test::grid_info({33, 20, 21}),
-                                       test::grid_info({17, 11, 11}, glm::dvec3(2.0))};
-  const HitMap map = make_hit_map(levels);
-  EXPECT_EQ(map.num_levels, 2u);
-  const uint layer = map.blocks_x * map.blocks_y;
-  // The second block along each axis of the coarser level, its last cell.
-  const uint block = 1 + map.blocks_x * (1 + map.blocks_y * (map.begin_z[1] + 1));
-  const HitCell cell = hit_cell(&map, block, 63);
-  EXPECT_EQ(cell.level, 1u);
-  EXPECT_EQ((std::array{cell.x, cell.y, cell.z}), (std::array{7u, 7u, 7u}));
-  EXPECT_EQ(hit_cell(&map, layer * map.begin_z[1] - 1, 0).level, 0u) << "the finest's last block";
-  HitRecord hit{};
-  hit.block_id = block;
-  hit.cell = 63;
-  hit.x = 0.5f;
-  std::array<double, 3> position;
-  hit_position(&map, hit, position.data());
-  EXPECT_EQ(position, (std::array{15.0, 14.0, 14.0}));
 }
 
 /// Only the direction of a gradient counts, however large or small it is.

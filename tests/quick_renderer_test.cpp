@@ -108,7 +108,7 @@ TEST_P(QuickRendererOnDevice, TheHostDrawsAllThatTheDeviceCan) {
   EXPECT_EQ(what_it_can(), (std::array{true, false}));
 }
 
-/// Bounds are found by whoever draws.
+/// Both renderers find bounds, whichever draws.
 TEST_P(QuickRendererOnDevice, BoundsDoNotWaitForTheDevice) {
   const auto volume = core::test::public_volume();
   for (const bool with_levels : {false, true}) {

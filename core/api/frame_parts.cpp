@@ -92,8 +92,7 @@ void check_wanted(const FrameRequest &request, const core::Abilities &abilities)
   if (!abilities.bounds) {
     throw core::Error(
         "this renderer knows no bounds of the error: leave out want_bounds, or draw on the host, "
-        "or "
-        "on a device by a renderer that was made with_bounds");
+        "or on a device by a renderer that was made with_bounds");
   }
 }
 

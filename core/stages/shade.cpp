@@ -60,7 +60,7 @@ void Shade::shade(const ShadeParams &params, Wavefront &rays, std::uint32_t samp
   staging_.read_async(std::as_writable_bytes(std::span(image.data(), image.size())), copied_);
 }
 
-/// Enqueues launch(range, begin, count) for as many rays at a time as staging_ holds, each followed
+/// Enqueues launch(begin, count) for as many rays at a time as staging_ holds, each followed
 /// by its copy.
 template <class T, class Launch>
 void Shade::copy_parts(HostArray<T> &values, std::size_t num_rays, const Launch &launch) {
@@ -68,8 +68,7 @@ void Shade::copy_parts(HostArray<T> &values, std::size_t num_rays, const Launch 
   const std::size_t most = staging_.size() / sizeof(T);
   for (std::size_t begin = 0; begin < num_rays; begin += most) {
     const std::size_t count = std::min(most, num_rays - begin);
-    launch(ocl::Range::strided(count, ocl::kGroupSize, device_), static_cast<uint>(begin),
-           static_cast<uint>(count));
+    launch(static_cast<uint>(begin), static_cast<uint>(count));
     staging_.read_async(std::as_writable_bytes(std::span(values.data() + begin, count)), copied_);
   }
 }
@@ -77,23 +76,25 @@ void Shade::copy_parts(HostArray<T> &values, std::size_t num_rays, const Launch 
 FrameArrays Shade::operator()(const WantedArrays &wanted, const ShadeParams &params,
                               const HitMap &map, Wavefront &rays, std::uint32_t samples) {
   const std::size_t num_rays = std::size_t{rays.frame.view.width} * rays.frame.view.height;
+  const auto range = [&](uint count) {
+    return ocl::Range::strided(count, ocl::kGroupSize, device_);
+  };
   ocl::InFlight<FrameArrays> arrays(device_);
   if (wanted.picture) shade(params, rays, samples, arrays->picture);
   if (wanted.depth) {
-    copy_parts(arrays->depth, num_rays, [&](const ocl::Range &range, uint begin, uint count) {
-      depths_(range, begin, count, rays.hits, staging_);
+    copy_parts(arrays->depth, num_rays, [&](uint begin, uint count) {
+      depths_(range(count), begin, count, rays.hits, staging_);
     });
   }
   if (wanted.normals) {
-    copy_parts(arrays->normals, num_rays, [&](const ocl::Range &range, uint begin, uint count) {
-      normals_(range, params, begin, count, rays.hits, staging_);
+    copy_parts(arrays->normals, num_rays, [&](uint begin, uint count) {
+      normals_(range(count), params, begin, count, rays.hits, staging_);
     });
   }
-  const bool has_doubles = device_.capabilities().fp64;
+  const bool has_doubles = HitPositions::suits(device_);
   if (wanted.positions && has_doubles) {
-    copy_parts(arrays->positions, num_rays, [&](const ocl::Range &range, uint begin, uint count) {
-      positions_(range, map, begin, count, rays.hits, staging_);
-    });
+    copy_parts(arrays->positions, num_rays,
+               [&](uint begin, uint count) { positions_(map, begin, count, rays.hits, staging_); });
   }
   if (copied_() != nullptr) copied_.wait();
   if (wanted.positions && !has_doubles) {

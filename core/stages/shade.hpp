@@ -5,8 +5,8 @@
 #include <cstdint>
 
 #include "core/frame/frame_arrays.hpp"
+#include "core/stages/hit_positions.hpp"
 #include "core/stages/wavefront.hpp"
-#include "kernels/hit_positions.hpp"
 #include "kernels/shade.hpp"
 
 namespace isowave::core {
@@ -46,7 +46,7 @@ class Shade {
   ocl::Kernel<kernels::shade> shade_;
   ocl::Kernel<kernels::hit_depths> depths_;
   ocl::Kernel<kernels::hit_normals> normals_;
-  ocl::Kernel<kernels::hit_positions> positions_;  ///< for devices with doubles
+  HitPositions positions_;
   HostMemory memory_;
   cl::Event copied_;  ///< the end of the last copy to the host
 };

@@ -42,17 +42,15 @@ def frames(rows):
 
 
 def front(rows):
-    yield "volume", "voxels", "device memory", "cold", "next", "warm", "floor"
+    yield "volume", "device memory", "cold", "next", "warm", "floor"
     for row in rows:
         if option(row, "--pipeline") != "rays":
             continue
-        x, y, z = (int(side) for side in row["volume"].rsplit("_", 1)[1].split("x"))
         yield (
             name_of(row["volume"]),
-            f"{x * y * z / 1e9:.2f} G",
             mebibytes(row["memory"]),
             *thrice(row),
-            ms(row["floor"]) if row["floor"] else "too large",
+            ms(row["floor"]) if row["floor"] else "-",
         )
 
 
