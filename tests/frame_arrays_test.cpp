@@ -80,13 +80,15 @@ TEST_P(FrameArraysOnDevice, SmallFramesOfAllRenderersHaveTheSame) {
     const TestVolume volume(info, test::sample(info.dims, test::gyroid_field(7)), 8);
     const Camera camera = orbit_cameras(info, 1)[0];
     ocl::Device device(GetParam().device);
+    const bool is_slow = is_simulator(device.info());  // it draws one frame, small and near
+    if (is_slow && distance != 2.0) continue;
     // An odd number of pixels; more bytes of positions than fit at once.
-    const ImageSize largest =
-        is_simulator(device.info()) ? ImageSize{7, 5, 2} : ImageSize{21, 13, 2};
+    const ImageSize largest = is_slow ? ImageSize{7, 5, 2} : ImageSize{21, 13, 2};
     DeviceRenderer renderer(device, volume.compressed, GetParam().with({.size = largest}));
     HostRenderer host(volume.compressed);
     TwinRenderer twin(volume.compressed, largest);
     for (const ImageSize size : {largest, ImageSize{7, 5}, ImageSize{1, 1}}) {
+      if (is_slow && size.samples != 2) continue;
       SCOPED_TRACE(fmt::format("{} x {}", size.ray_columns(), size.ray_rows()));
       FrameArrays of_device;
       for (Renderer *each : {static_cast<Renderer *>(&renderer), static_cast<Renderer *>(&host),
@@ -107,7 +109,7 @@ TEST_P(FrameArraysOnDevice, SmallFramesOfAllRenderersHaveTheSame) {
       }
     }
     const FrameArrays few = renderer.fetch({.normals = true}, {});
-    EXPECT_EQ(few.normals.size(), 1u);
+    EXPECT_EQ(few.normals.size(), is_slow ? largest.num_rays() : 1u);
     EXPECT_TRUE(few.picture.empty() && few.depth.empty() && few.positions.empty());
   }
 }

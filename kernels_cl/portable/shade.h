@@ -143,9 +143,10 @@ ISO_INLINE AmbientDirection world_normal(const ShadeParams *p, HitRecord hit) {
   normal.z = hit.t == INFINITY ? 0.0f : hit.grad_z;
   normal = normalized(normal);
   normal = normalized(turned(p->normal, normal.x, normal.y, normal.z));
-  normal.x = 0.0f - normal.x; /* never -0 */
-  normal.y = 0.0f - normal.y;
-  normal.z = 0.0f - normal.z;
+  /* Never -0, which Mesa makes of 0.0f - x. */
+  normal.x = normal.x == 0.0f ? 0.0f : -normal.x;
+  normal.y = normal.y == 0.0f ? 0.0f : -normal.y;
+  normal.z = normal.z == 0.0f ? 0.0f : -normal.z;
   return normal;
 }
 
