@@ -5,10 +5,9 @@
 #define PIXELS 4u /* of a work-item: RGB of four pixels are three words */
 
 /// In      hits [height * width]; open_counts, num_ambient: see shade_pixel()
-/// Out     bytes: pixels of (height / samples) rows and (width / samples) columns, red first, 8
-/// bits
-///         each: RGBA [pixel][4] if with_alpha is not 0, else RGB [pixel][3]. Pixels are rounded up
-///         to a multiple of four; those beyond the picture are 0.
+/// Out     bytes: RGBA [height / samples][width / samples][4] if with_alpha is not 0, else RGB
+///         [3]; 8 bits each. Pixels are rounded up to a multiple of four; those beyond the picture
+///         are 0.
 /// Launch  grid-stride over four pixels
 kernel void shade(const FrameParams frame_params, const ShadeParams shade_params, uint samples,
                   global const HitRecord *hits, global const uchar *open_counts, uint num_ambient,

@@ -9,7 +9,7 @@
 
 namespace isowave {
 
-/// Which renderers add_choices() puts around another.
+/// The renderers that add_choices() puts around another.
 struct Choices {
   bool with_bounds = false;       ///< frames within an error: the other one has bounds
   bool with_time_budget = false;  ///< frames within a time: the other one keeps pictures

@@ -1,11 +1,13 @@
 #include "core/frame/frame_arrays.hpp"
 
 #include "core/view/detail.hpp"
+#include "core/volume/pyramid.hpp"
 #include "core/volume/world_positions.hpp"
 
 namespace isowave::core {
 
 HitMap make_hit_map(std::span<const VolumeInfo> levels) {
+  static_assert(ISO_MAX_LEVELS == kMaxLevels);
   HitMap map{};
   map.map = make_world_map(levels.front());
   map.is_float32 = float32_holds_positions(levels.front()) ? 1 : 0;

@@ -151,7 +151,8 @@ struct FrameStatistics {
   double ambient_ms = 0;                          ///< part of total_ms
   std::uint64_t uploaded_bytes = 0;               ///< from a compressed volume on the host
   std::uint32_t first_level = 0, last_level = 0;  ///< levels of detail that drew; 0: the finest
-  double total_ms = 0;     ///< wall clock, from camera to the wanted arrays in the host's memory
+  /// Wall clock, from camera to the wanted arrays in the host's memory, without Frame::bounds.
+  double total_ms = 0;
   double hits_ms = 0;      ///< part of total_ms: from camera to finished hits, on a device
   bool cancelled = false;  ///< on_pass stopped the frame
   bool complete = true;    ///< false: cancelled, or the time was over
