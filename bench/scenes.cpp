@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/sources/generate.hpp"
+#include "core/zfp/zfp_accuracy.hpp"
 
 namespace isowave::core::bench {
 
@@ -40,6 +41,21 @@ const CompressedVolume &mixing_layer(std::int64_t edge, std::int64_t rate) {
     CompressOptions options;
     options.rate = static_cast<std::uint32_t>(rate);
     volume = compress(*open_generated(generate), options);
+  }
+  return volume;
+}
+
+const CompressedVolume &exact_mixing_layer(std::int64_t edge) {
+  static std::map<std::int64_t, CompressedVolume> volumes;
+  CompressedVolume &volume = volumes[edge];
+  if (volume.words.empty()) {
+    GenerateOptions generate;
+    generate.dims = glm::uvec3(static_cast<std::uint32_t>(edge));
+    generate.type = VoxelType::kUint8;
+    const auto reader = open_generated(generate);
+    CompressOptions options;
+    options.precision = choose_precision(*reader, {.exact = true}, {});
+    volume = compress(*reader, options);
   }
   return volume;
 }

@@ -13,6 +13,9 @@ namespace isowave::core::bench {
 const CompressedVolume &mixing_layer(std::int64_t edge, std::int64_t rate = 4);
 inline constexpr float kMixingLayerIsovalue = 0.5f;
 
+/// The same as voxels of uint8, without a loss: blocks have lengths of their own.
+const CompressedVolume &exact_mixing_layer(std::int64_t edge);
+
 /// blocks_x * blocks_y * 2 blocks: a wavy surface at isovalue 0 passes through every block of the
 /// first layer; those of the second own no cell. Seen along z, each ray has exactly one block to
 /// test.

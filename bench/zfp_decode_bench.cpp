@@ -1,6 +1,7 @@
 // Decoding listed blocks into cache slots: zfp_decode.cl, over rates and orders of the list.
 
 #include <algorithm>
+#include <cstring>
 #include <utility>
 
 #include "bench/harness.hpp"
@@ -32,23 +33,32 @@ CompressedVolume repeated_volume(std::int64_t rate) {
 enum class Order { kSequential, kSorted, kRandom };
 
 struct DecodeInput {
+  /// Of the real stream, as often as there are copies.
   DecodeInput(ocl::Device &device, std::int64_t rate, Order order)
-      : stream(device, repeated_volume(rate)),
-        decode(device, kNumDecoded),
+      : DecodeInput(device, repeated_volume(rate), kCopies, order, SlotType::kFloat32) {}
+  /// Of blocks that have lengths of their own; the list has each several times.
+  DecodeInput(ocl::Device &device, SlotType slot_type)
+      : DecodeInput(device, exact_mixing_layer(kEdge), 1, Order::kSorted, slot_type) {}
+
+  DecodeInput(ocl::Device &device, const CompressedVolume &volume, std::uint32_t copies,
+              Order order, SlotType slot_type)
+      : stream(device, volume),
+        type(slot_type),
+        decode(device, kNumDecoded, stream.defines(), false, type),
         counts(device, "counts", 1),
         block_ids(device, "block ids", kNumDecoded),
         slots(device, "slots", kNumDecoded),
         inside(device, "voxels inside", kNumDecoded),
-        values(device, "values", std::size_t{kNumDecoded} * ISO_BLOCK_VOXELS) {
-    const CompressedVolume &volume = mixing_layer(kEdge, rate);
-    const auto num_blocks = static_cast<uint>(kCopies * volume.block_count());
+        values(device, "values", kNumDecoded * slot_bytes(type)) {
+    const auto num_blocks = static_cast<uint>(copies * volume.block_count());
     Random random;
-    std::vector<uint> all(num_blocks);
-    for (uint i = 0; i < num_blocks; ++i) all[i] = i;
-    if (order != Order::kSequential) random.shuffle(all);
-    std::vector<uint> ids(all.begin(), all.begin() + kNumDecoded), slot_ids(kNumDecoded);
+    std::vector<uint> ids(kNumDecoded), slot_ids(kNumDecoded);
+    for (uint i = 0; i < kNumDecoded; ++i) {
+      ids[i] = i % num_blocks;
+      slot_ids[i] = i;
+    }
+    if (order != Order::kSequential) random.shuffle(ids);
     if (order == Order::kSorted) std::sort(ids.begin(), ids.end());
-    for (uint i = 0; i < kNumDecoded; ++i) slot_ids[i] = i;
     if (order == Order::kRandom) random.shuffle(slot_ids);
     block_ids.write(ids);
     slots.write(slot_ids);
@@ -63,7 +73,14 @@ struct DecodeInput {
   /// Every block, bit for bit, against libzfp.
   void verify(const CompressedVolume &volume, const std::vector<uint> &ids,
               const std::vector<uint> &slot_ids) {
-    const std::vector<float> expected = decode_with_libzfp(volume), got = values.read();
+    const std::vector<float> expected = decode_with_libzfp(volume);
+    const std::vector<SlotValue> bytes = values.read();
+    std::vector<float> got(std::size_t{kNumDecoded} * ISO_BLOCK_VOXELS);
+    if (type == SlotType::kUint8) {
+      std::ranges::transform(bytes, got.begin(), [](SlotValue value) { return float(value.byte); });
+    } else {
+      std::memcpy(got.data(), bytes.data(), bytes.size());
+    }
     constexpr std::size_t kBlocks = kEdge / 4;
     for (std::size_t i = 0; i < ids.size(); ++i) {
       const std::size_t id = ids[i] % volume.block_count();
@@ -77,18 +94,30 @@ struct DecodeInput {
   }
 
   DeviceStream stream;
+  SlotType type;
   ZfpDecode decode;
   CountsBuffer counts;
   ocl::Buffer<uint> block_ids, slots;
   FrameParams frame{};
   ocl::Buffer<ulong> inside;
-  ocl::Buffer<float> values;
+  ocl::Buffer<SlotValue> values;
 };
 
 void decode_blocks(benchmark::State &state, Order order) {
   auto &in = input<DecodeInput>(state.range(0), order);
   const double block_bytes =
       in.stream.layout.bits_per_block / 8.0 + ISO_BLOCK_VOXELS * sizeof(float) + 8;
+  measure(
+      state, {kNumDecoded, kNumDecoded * block_bytes}, [] {}, [&] { in.run(); });
+}
+
+void decode_whole_numbers(benchmark::State &state) {
+  const SlotType type = state.range(0) == 8 ? SlotType::kUint8 : SlotType::kFloat32;
+  auto &in = input<DecodeInput>(type);
+  const CompressedVolume &volume = exact_mixing_layer(kEdge);
+  const double stream_bytes = sizeof(uint) * double(volume.word_count());
+  const double block_bytes =
+      stream_bytes / double(volume.block_count()) + double(slot_bytes(type)) + 8;
   measure(
       state, {kNumDecoded, kNumDecoded * block_bytes}, [] {}, [&] { in.run(); });
 }
@@ -102,6 +131,10 @@ const bool kRegistered = [] {
         ->ArgName("rate")
         ->ArgsProduct({{1, 2, 4, 8, 16}});
   }
+  stage_benchmark("zfp_decode/whole_numbers", decode_whole_numbers)
+      ->ArgName("slot_bits")
+      ->Arg(32)
+      ->Arg(8);
   return true;
 }();
 

@@ -14,6 +14,7 @@
 /// wait for the next. (Not in the paper, whose cache grows instead.)
 #include "device/block_requests.h"
 #include "device/ray_pairs.h"
+#include "device/slot_values.h"
 
 #define ISO_SPARE_PART 16u  ///< one slot of so many may be freed beyond need
 
@@ -321,7 +322,7 @@ kernel void cache_rebuild(const FrameParams frame_params, global const PassCount
 /// For another isovalue: which voxels of the cached blocks are inside. Grid-stride over slots and
 /// table.
 kernel void cache_classify(const FrameParams frame_params, uint num_slots,
-                           global const uint *slot_block_ids, global const float *cache_values,
+                           global const uint *slot_block_ids, global const SlotValue *cache_values,
                            global ulong *inside, global BlockEntry *table) {
   const FrameParams *frame = &frame_params;
   for (uint slot = get_global_id(0); slot < num_slots; slot += get_global_size(0)) {

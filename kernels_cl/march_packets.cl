@@ -326,7 +326,7 @@ kernel __attribute__((reqd_work_group_size(1, 1, 1))) void march_packets(
     const FrameParams frame_params, uint begins, global const uint *part_0,
     global const uint *part_1, global const uint *part_2, global const uint *part_3,
     global const uint *index, const StreamLayout layout, global const uint *macrocell_masks,
-    global BlockEntry *table, global ulong *inside, global float *cache_values,
+    global BlockEntry *table, global ulong *inside, global SlotValue *cache_values,
     global const PassCounts *prev, global PassCounts *counts, global const uint *active_ray_ids,
     global uint *next_active_ray_ids, global uint *ray_block_ids, global HitRecord *hits,
     global uint *slot_block_ids, global uint *slot_stamps, global uint *requested_bits,

@@ -6,6 +6,7 @@
 /// Counting looks at signs alone, 64 of them in a word. Vertices are numbered through all listed
 /// blocks, in the order of the list, so that triangles name those of neighbours.
 #include "device/dual_grid_inside.h"
+#include "device/slot_values.h"
 #include "device/work_group.h"
 #include "portable/cells_with_data.h"
 #include "portable/marching_cubes.h"
@@ -43,7 +44,7 @@ kernel void marching_cubes_count(const FrameParams frame_params, uint begin, uin
 /// The cached neighbourhood of a block.
 typedef struct Neighbourhood {
   local const uint *slots; /* [27] of blocks -1 .. 1 along x, y, z */
-  global const float *values;
+  global const SlotValue *values;
 } Neighbourhood;
 
 /// The voxel (x,y,z), -4 .. 7 along each axis, counted from the block's first one.
@@ -135,7 +136,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void marching
     const FrameParams frame_params, uint begin, uint end, uint with_gradients,
     global const uint *block_ids, global const uint *listed_masks,
     global const uint *listed_offsets, global const BlockEntry *table,
-    global const float *cache_values, global const ulong *inside,
+    global const SlotValue *cache_values, global const ulong *inside,
     global const uchar *cell_triangles, global const uint *index, uint no_data_begin,
     global const BlockEdges *edges, global const uint *vertex_offsets,
     global const uint *triangle_offsets, global MeshVertex *vertices, global float *gradients,

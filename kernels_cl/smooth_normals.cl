@@ -7,6 +7,7 @@
 #define ISO_FOUND local
 #include "device/level_borders.h"
 #include "device/pass_counts.h"
+#include "device/slot_values.h"
 #include "device/touched_requests.h"
 #include "device/work_group.h"
 #include "portable/block_cells.h"
@@ -45,7 +46,7 @@ ISO_INLINE uint find_slots(const FrameParams *frame, global const BlockEntry *ta
 /// The voxels of a stencil in the cache: in slots [8] of the blocks from `base` on, ISO_GROUP_SIZE
 /// apart.
 typedef struct CachedStencil {
-  global const float *values;
+  global const SlotValue *values;
   local const uint *slots;
   BlockCoords base;
 } CachedStencil;
@@ -123,7 +124,7 @@ ISO_INLINE void write_gradient(global HitRecord *hit, const CachedStencil *cache
 ///         in parts as start_rays
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void smooth_normals(
     const FrameParams frame_params, global const FrameParams *frames, uint num_frames, uint parts,
-    uint begins, global const BlockEntry *table, global const float *cache_values,
+    uint begins, global const BlockEntry *table, global const SlotValue *cache_values,
     global const PassCounts *prev, global PassCounts *counts, global PassCounts *next_counts,
     global const uint *active_ray_ids, global uint *next_active_ray_ids, global HitRecord *hits,
     global uint *slot_stamps, global uint *requested_bits, global uint *request_block_ids,

@@ -1,10 +1,11 @@
 /// zfp_decode.cl -- decodes the pass's new blocks into their cache slots (Sec. 3.5).
 #include "device/block_stream.h"
 #include "device/level_requests.h"
+#include "device/slot_values.h"
 #include "portable/block_grid.h"
 #include "portable/shared_types.h"
 
-#define ISO_STAGED_VALUES 16u  ///< of each block that go to the cache together: 64 bytes
+#define ISO_STAGED_WORDS 16u  ///< of each slot that go to the cache together: 64 bytes
 
 /// 1 for a voxel that is not inside. value: minus the isovalue, never -0; NaN of one without data.
 ISO_INLINE uint is_outside(float value) {
@@ -30,9 +31,9 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void zfp_deco
     const StreamLayout layout, const FrameParams next_frame, global const uint *next_words,
     global const uint *next_index, const StreamLayout next_layout, uint first, uint end,
     global const PassCounts *counts, global const uint *places, global const uint *block_ids,
-    global const uint *slots, global float *cache_values, global ulong *inside) {
-  local float
-      staged[ISO_GROUP_SIZE * (ISO_STAGED_VALUES + 1)]; /* + 1: no two work-items in one bank */
+    global const uint *slots, global SlotValue *cache_values, global ulong *inside) {
+  global uint *cache_words = (global uint *)cache_values;
+  local uint staged[ISO_GROUP_SIZE * (ISO_STAGED_WORDS + 1)]; /* + 1: no two items in one bank */
   local uint to_slots[ISO_LEVEL_SLOTS];
   const float isovalue = /* nothing minus this is -0 */
       frame_params.surface.isovalue == 0.0f ? -0.0f : frame_params.surface.isovalue;
@@ -61,21 +62,20 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void zfp_deco
       inside[slots[request]] = ~((ulong)outside_high << 32 | outside_low);
     }
     ISO_UNROLL
-    for (uint part = 0; part < ISO_BLOCK_VOXELS; part += ISO_STAGED_VALUES) {
+    for (uint part = 0; part < ISO_SLOT_WORDS; part += ISO_STAGED_WORDS) {
       barrier(CLK_LOCAL_MEM_FENCE);
       if (block_id != ISO_INVALID_ID) {
         ISO_UNROLL
-        for (uint v = 0; v < ISO_STAGED_VALUES; ++v) {
-          staged[item * (ISO_STAGED_VALUES + 1) + v] = values[part + v];
-        }
+        for (uint w = 0; w < ISO_STAGED_WORDS; ++w)
+          staged[item * (ISO_STAGED_WORDS + 1) + w] = slot_word(values, part + w);
       }
       barrier(CLK_LOCAL_MEM_FENCE);
-      for (uint i = item; i < num_blocks * ISO_STAGED_VALUES; i += ISO_GROUP_SIZE) {
-        const uint block = i / ISO_STAGED_VALUES, v = i % ISO_STAGED_VALUES;
+      for (uint i = item; i < num_blocks * ISO_STAGED_WORDS; i += ISO_GROUP_SIZE) {
+        const uint block = i / ISO_STAGED_WORDS, w = i % ISO_STAGED_WORDS;
         const uint slot = told_slot(to_slots, slots, begin, block);
         if (is_served(slot))
-          cache_values[slot * ISO_BLOCK_VOXELS + part + v] =
-              staged[block * (ISO_STAGED_VALUES + 1) + v];
+          cache_words[slot * ISO_SLOT_WORDS + part + w] =
+              staged[block * (ISO_STAGED_WORDS + 1) + w];
       }
     }
     barrier(CLK_LOCAL_MEM_FENCE);

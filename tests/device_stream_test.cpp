@@ -16,6 +16,7 @@
 #include "kernels_cl/portable/zfp_codec.h"
 #include "tests/frame_scene.hpp"
 #include "tests/run_program.hpp"
+#include "tests/slot_values.hpp"
 #include "tests/stage_support.hpp"
 #include "tests/test_devices.hpp"
 
@@ -190,10 +191,10 @@ class DeviceStreamOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
         d_slots(device_, "slots", std::span<const uint>(listed));
     const FrameParams frame{};
     ocl::Buffer<ulong> inside(device_, "inside", num_blocks);
-    ocl::Buffer<float> values(device_, "values", 64 * std::size_t{num_blocks});
+    ocl::Buffer<SlotValue> values(device_, "values", 256 * std::size_t{num_blocks});
     ZfpDecode zfp_decode(device_, num_blocks, stream.defines());
     zfp_decode(stream, frame, counts, d_block_ids, d_slots, values, inside);
-    return values.read();
+    return test::slot_values(values);
   }
 
   void expect_decoded(const CompressedVolume &volume, const DeviceStream &stream) {
@@ -385,7 +386,7 @@ TEST_P(DeviceStreamOnDevice, DecodersOfAnotherKindOfStreamAreRefused) {
   const CountsBuffer counts(device_, "counts", 1);
   const ocl::Buffer<uint> ids(device_, "block ids", 1);
   const FrameParams frame{};
-  ocl::Buffer<float> values(device_, "values", 64);
+  ocl::Buffer<SlotValue> values(device_, "values", 256);
   ocl::Buffer<ulong> inside(device_, "inside", 1);
   EXPECT_THROW(decode(stream, frame, counts, ids, ids, values, inside), std::invalid_argument);
 }

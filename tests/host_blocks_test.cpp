@@ -368,7 +368,7 @@ TEST(HostLoops, RangesOfParts) {
       const glm::uvec3 begin = 4u * block, size = glm::min(dims - begin, 4u);
       BlockRange parts[8];
       loops.ranges({compressed.words.data(), compressed.block_begin(id), compressed.block_bits(id),
-                    compressed.precision.min_exponent, false, size.x, size.y, size.z, 0},
+                    compressed.precision.min_exponent, 1, 0, size.x, size.y, size.z, 0},
                    parts);
       for (std::uint32_t part = 0; part < 8; ++part) {
         const glm::uvec3 end =

@@ -209,7 +209,7 @@ class HostLevelsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {};
 INSTANTIATE_TEST_SUITE_P(Devices, HostLevelsOnDevice, testing::ValuesIn(devices_under_test()),
                          device_test_name);
 
-TEST_P(HostLevelsOnDevice, SmallFramesAreTheDevices) {
+TEST_P(HostLevelsOnDevice, FramesAreTheDevices) {
   const CompressedVolume volume = pyramid_of({30, 27, 33}, test::gyroid_field(10));
   ocl::Device device(GetParam());
   const ImageSize size{24, 16, 2};

@@ -66,7 +66,7 @@ TEST(HostLoops, AllGiveTheSameBits) {
       float values[64];
       loops.decode({volume.compressed.words.data(), volume.compressed.block_begin(id),
                     volume.compressed.block_bits(id), volume.compressed.precision.min_exponent,
-                    false, 4, 4, 4, 0},
+                    1, 0, 4, 4, 4, 0},
                    values);
       ASSERT_EQ(std::memcmp(values, blocks.field().values + 64 * id, sizeof(values)), 0) << id;
       EXPECT_EQ(loops.inside(values, 10), host_loops().inside(values, 10));

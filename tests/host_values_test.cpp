@@ -207,7 +207,7 @@ INSTANTIATE_TEST_SUITE_P(Devices, HostValuesOnDevice, testing::ValuesIn(devices_
                          device_test_name);
 
 /// Bounds of the error, and the detail that keeps one.
-TEST_P(HostValuesOnDevice, SmallErrorsAreTheDevices) {
+TEST_P(HostValuesOnDevice, ErrorsAreTheDevices) {
   const BoundsScene scene({40, 37, 44}, test::gyroid_field(17), {.rate = 18});
   ocl::Device device(GetParam());
   DeviceRenderer on_device(device, scene.volume, with_choices({.size = kSize}, scene.volume));

@@ -13,6 +13,7 @@
 
 #include "core/render/device_renderer.hpp"
 #include "tests/rays_world.hpp"
+#include "tests/slot_values.hpp"
 #include "tests/stage_support.hpp"
 #include "tests/test_devices.hpp"
 
@@ -164,7 +165,7 @@ class MarchPacketsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
                             free_slots = world.cache.free_slots.read(),
                             marks = world.cache.requested_bits.read(),
                             slots = world.slots_by_block();
-    const std::vector<float> values = world.cache.values.read();
+    const std::vector<float> values = test::slot_values(world.cache.values);
     const std::vector<ulong> inside = world.cache.inside.read();
     const CacheState state = world.cache.state.read().front();
     ASSERT_EQ(std::ranges::count(marks, 0u), std::ssize(marks));
@@ -369,7 +370,7 @@ TEST_P(MarchPacketsOnDevice, ThreadsMeetAtBlocks) {
   for (int frame = 0; frame < 500 && !HasFailure(); ++frame) {
     SCOPED_TRACE(fmt::format("frame {}", frame));
     world.cache.clear();
-    world.cache.values.fill(frame % 2 == 0 ? 1000.0f : -1000.0f);
+    test::fill_slots(world.cache.values, SlotType::kFloat32, frame % 2 == 0 ? 1000.0f : -1000.0f);
     world.cache.inside.fill(frame % 2 == 0 ? ~ulong{0} : 0);
     world.rays.forget_rays();
     march_packets.begin_frame();

@@ -215,6 +215,41 @@ TEST_P(RenderOnDevice, ExactVolumesAreTheirSource) {
   EXPECT_GT(check(volume, {1, 70, 69.5f}, kMedium), 1000u);
 }
 
+/// Slots have the volume's type. The values take its whole range; both normals, several isovalues
+/// of one cache, fewer bit planes, both pipelines.
+TEST_P(RenderOnDevice, SmallShortIntegersInSlotsOfTheirType) {
+  for (const VoxelType type :
+       {VoxelType::kUint8, VoxelType::kInt8, VoxelType::kUint16, VoxelType::kInt16}) {
+    SCOPED_TRACE(to_string(type));
+    VolumeInfo info = test::grid_info({13, 10, 11});
+    info.type = type;
+    const auto [least, greatest] = whole_numbers_of(type, BlockPrecision{.whole_numbers = true});
+    std::vector<float> source = test::sample(info.dims, test::noise_field(5));
+    for (float &voxel : source)
+      voxel = std::rint(std::clamp(least + voxel * (greatest - least), least, greatest));
+    source.front() = least;
+    source.back() = greatest;
+    const TestVolume volume(info, source, ErrorGoal{.exact = true});
+    ASSERT_EQ(volume.voxels, source);
+    const float middle = std::rint(0.5f * (least + greatest));
+    const auto cameras = orbit_cameras(info, 1);
+    const ImageSize size = small_size();
+    EXPECT_GT(check(volume, cameras, {middle, middle + 0.5f}, size), 10u);
+    if (is_simulator(GetParam()) && type != VoxelType::kInt8) continue;
+    EXPECT_GT(check(volume, cameras, {middle}, size, {.pipeline = blocks_pipeline()}), 5u);
+    DeviceRenderer renderer(*device_, volume.compressed, {.size = size});
+    const MemoryPlan &plan = renderer.memory_plan();
+    EXPECT_EQ(plan.buffers["block cache"].bytes(),
+              std::uint64_t{plan.cache_slots} * ISO_BLOCK_VOXELS * size_of(type));
+    const float voxel_error = std::exp2(std::floor(std::log2((greatest - least) / 8)));
+    renderer.render({.camera = cameras[0], .isovalue = middle, .voxel_error = voxel_error});
+    expect_same_hits(renderer.hits(),
+                     twin_hits(make_frame_params(info, cameras[0], size, middle),
+                               decode_with_libzfp(volume.compressed, voxel_error)),
+                     size.width);
+  }
+}
+
 TEST_P(RenderOnDevice, SheetsAndNoiseAtEveryRate) {
   for (const std::uint32_t rate : {1u, 4u, 32u}) {
     SCOPED_TRACE(fmt::format("rate {}", rate));

@@ -12,6 +12,7 @@
 #include "core/stages/wavefront.hpp"
 #include "core/view/frame.hpp"
 #include "kernels_cl/portable/block_grid.h"
+#include "tests/slot_values.hpp"
 #include "tests/stage_support.hpp"
 
 namespace isowave::core {
@@ -107,7 +108,7 @@ struct StageWorld {
     const uint granted = counts().decoded_count;
     const std::vector<uint> blocks = cache.request_block_ids.read(),
                             slots = cache.decode_slots.read();
-    std::vector<float> values = cache.values.read();
+    std::vector<float> values = test::slot_values(cache.values);
     for (uint i = 0; i < granted; ++i) {
       const uint x0 = 4 * (blocks[i] % frame.grid.blocks_x),
                  y0 = 4 * (blocks[i] / frame.grid.blocks_x % frame.grid.blocks_y),
@@ -121,7 +122,7 @@ struct StageWorld {
                       : std::numeric_limits<float>::quiet_NaN();
       }
     }
-    cache.values.write(values);  // whole: see kernels_cl/README.md, Oclgrind
+    cache.values.write(test::float_slots(values));  // whole: see kernels_cl/README.md, Oclgrind
   }
 
   FrameParams frame;

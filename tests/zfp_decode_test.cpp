@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "kernels_cl/portable/zfp_codec.h"
+#include "tests/slot_values.hpp"
 #include "tests/stage_support.hpp"
 #include "tests/test_devices.hpp"
 #include "tests/zfp_values.hpp"
@@ -119,7 +120,8 @@ class ZfpDecodeOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
 
   /// Decodes a random part of a shuffled list of blocks to random slots; all other slots keep their
   /// values.
-  void expect_decoded(const CompressedVolume &volume, uint seed) {
+  void expect_decoded(const CompressedVolume &volume, uint seed, SlotType type = SlotType::kFloat32,
+                      float sentinel = kSentinel) {
     SCOPED_TRACE(fmt::format("{} bits per block, {} blocks, seed {}", volume.bits_per_block,
                              volume.block_count(), seed));
     Random random(seed);
@@ -133,8 +135,8 @@ class ZfpDecodeOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     PassCounts start = distinct_counts();
     start.decoded_count = num_blocks - num_blocks / 4;
     CountsBuffer counts(device_, "counts", std::span<const PassCounts>(&start, 1));
-    ocl::Buffer<float> values(device_, "values", 64 * std::size_t{num_slots});
-    values.fill(kSentinel);
+    ocl::Buffer<SlotValue> values(device_, "values", slot_bytes(type) * num_slots);
+    test::fill_slots(values, type, sentinel);
     const DeviceStream stream(device_, volume);
     const ocl::Buffer<uint> d_block_ids(device_, "block ids", std::span<const uint>(block_ids)),
         d_slots(device_, "slots", std::span<const uint>(slots));
@@ -143,16 +145,16 @@ class ZfpDecodeOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
     frame.surface.isovalue = std::array{0.25f, 0.0f, -0.0f}[seed % 3];
     ocl::Buffer<ulong> inside(device_, "inside", num_slots);
 
-    ZfpDecode decode(device_, num_blocks);
+    ZfpDecode decode(device_, num_blocks, stream.defines(), false, type);
     decode(stream, frame, counts, d_block_ids, d_slots, values, inside);
 
     const std::vector<float> decoded = decode_blocks_with_libzfp(volume);
-    std::vector<float> expected(64 * std::size_t{num_slots}, kSentinel);
+    std::vector<float> expected(64 * std::size_t{num_slots}, sentinel);
     for (uint i = 0; i < start.decoded_count; ++i) {
       std::copy_n(decoded.begin() + 64 * std::ptrdiff_t(block_ids[i]), 64,
                   expected.begin() + 64 * std::ptrdiff_t(slots[i]));
     }
-    EXPECT_EQ(first_other_bits(values.read(), expected), kNoDifference);
+    EXPECT_EQ(first_other_bits(test::slot_values(values, type), expected), kNoDifference);
     expect_counts(counts, start);
     const std::vector<ulong> got_inside = inside.read();
     for (uint i = 0; i < start.decoded_count; ++i) {
@@ -210,13 +212,13 @@ TEST_P(ZfpDecodeOnDevice, NothingToDecodeTouchesNothing) {
   const DeviceStream stream(device_, compress_with_libzfp(random_voxels(dims, 0, 1, 14), dims, 64));
   CountsBuffer counts(device_, "counts", 1);  // decoded_count = 0
   const ocl::Buffer<uint> ids(device_, "block ids", 1), slots(device_, "slots", 1);
-  ocl::Buffer<float> values(device_, "values", 64);
-  values.fill(kSentinel);
+  ocl::Buffer<SlotValue> values(device_, "values", 64 * sizeof(float));
+  test::fill_slots(values, SlotType::kFloat32, kSentinel);
   const FrameParams frame{};
   ocl::Buffer<ulong> inside(device_, "inside", 1);
   ZfpDecode decode(device_, 1);
   decode(stream, frame, counts, ids, slots, values, inside);
-  EXPECT_EQ(values.read(), std::vector<float>(64, kSentinel));
+  EXPECT_EQ(test::slot_values(values), std::vector<float>(64, kSentinel));
 }
 
 /// Bits past 2^32 of the stream: the bit offset of a block does not fit 32 bits.
@@ -240,7 +242,7 @@ TEST_P(ZfpDecodeOnDevice, BlocksBehind32BitsOfBits) {
   PassCounts start{};
   start.decoded_count = 2;
   const CountsBuffer counts(device_, "counts", std::span<const PassCounts>(&start, 1));
-  ocl::Buffer<float> values(device_, "values", 128);
+  ocl::Buffer<SlotValue> values(device_, "values", 128 * sizeof(float));
   const FrameParams frame{};
   ocl::Buffer<ulong> inside(device_, "inside", 2);
   ZfpDecode decode(device_, 2);
@@ -248,7 +250,33 @@ TEST_P(ZfpDecodeOnDevice, BlocksBehind32BitsOfBits) {
   const std::vector<float> decoded = decode_blocks_with_libzfp(volume);
   std::vector<float> expected(decoded.begin() + 2 * 64, decoded.begin() + 3 * 64);
   expected.insert(expected.end(), decoded.begin() + 7 * 64, decoded.end());
-  EXPECT_EQ(first_other_bits(values.read(), expected), kNoDifference);
+  EXPECT_EQ(first_other_bits(test::slot_values(values), expected), kNoDifference);
+}
+
+/// Values beyond the type are held at its ends; so are those of fewer bit planes.
+TEST_P(ZfpDecodeOnDevice, SmallShortIntegers) {
+  const glm::uvec3 dims(9, 6, 7);
+  for (const VoxelType of :
+       {VoxelType::kUint8, VoxelType::kInt8, VoxelType::kUint16, VoxelType::kInt16}) {
+    SCOPED_TRACE(to_string(of));
+    BlockPrecision precision{.min_exponent = ISO_ALL_PLANES, .whole_numbers = true};
+    const auto [least, greatest] = whole_numbers_of(of, precision);
+    const float margin = 0.2f * (greatest - least);
+    for (const std::int32_t min_exponent : {ISO_ALL_PLANES, 4}) {
+      CompressedVolume volume = compress_with_libzfp(
+          random_voxels(dims, least - margin, greatest + margin, 16), dims, 1024);
+      precision.min_exponent = min_exponent;
+      volume.info.type = of;
+      volume.precision = precision;
+      const std::vector<float> decoded = decode_with_libzfp(volume);
+      EXPECT_EQ(std::ranges::min(decoded), least);
+      EXPECT_EQ(std::ranges::max(decoded), greatest);
+      const SlotType type = slot_type_for(volume);
+      EXPECT_NE(type, SlotType::kFloat32);
+      expect_decoded(volume, 16, type, 17);
+      expect_decoded(volume, 17, SlotType::kFloat32);
+    }
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Devices, ZfpDecodeOnDevice, testing::ValuesIn(devices_under_test()),

@@ -72,8 +72,7 @@ class BlockValues {
                        std::span(words).first((bits + 31) / 32 + kDecoderAhead));
     std::array<float, 64> &values = entry->second;
     zfp_decode_any_block(words.data(), 0, bits, bound_.min_exponent, values.data());
-    if (bound_.whole_numbers)
-      std::ranges::transform(values, values.begin(), [](float v) { return std::rint(v) + 0.0f; });
+    round_to(whole_numbers_of(volume_.info.type, bound_), values);
     clear_no_data(volume_.no_data.mask(id), values);
     return values;
   }

@@ -69,7 +69,7 @@ Extractor::Extractor(ocl::Device &device, const CompressedVolume &volume,
       info_(volume.info),
       gradients_(options.with_normals ? Gradients::kSmooth : Gradients::kNone),
       blocks_(device, volume, block_options(device, options, gradients_)),
-      marching_cubes_(device, gradients_) {
+      marching_cubes_(device, gradients_, blocks_.cache().slot_type) {
   if (options.cache_slots != 0 && options.cache_slots < blocks_of_block(gradients_)) {
     throw Error("a cache of {} blocks cannot be used: a block of the surface needs {}",
                 options.cache_slots, blocks_of_block(gradients_));

@@ -22,8 +22,8 @@ OnHost window_for(const CompressedVolume &volume) {
 }
 
 /// All slots may be requested in one pass, whatever number of rays.
-BlockCache::Limits cache_limits(const BlockGrid &grid, std::uint32_t num_slots) {
-  return BlockCache::limits_for(grid, num_slots, ISO_MAX_CACHE_SLOTS);
+BlockCache::Limits cache_limits(const BlockGrid &grid, std::uint32_t num_slots, SlotType type) {
+  return BlockCache::limits_for(grid, num_slots, ISO_MAX_CACHE_SLOTS, 2, type);
 }
 
 Wavefront::Limits ray_limits(const SurfaceBlocks::Options &options) {
@@ -86,7 +86,7 @@ SurfaceBlocks::SurfaceBlocks(ocl::Device &device, const CompressedVolume &volume
       grid_(make_grid(volume.info)),
       budget_(options.memory_budget),
       store_(device, volume, make_stream(device, volume, options),
-             cache_limits(grid_, least_slots()), ocl::kGroupSize),
+             cache_limits(grid_, least_slots(), slot_type_for(volume)), ocl::kGroupSize),
       rays_(device, ray_limits(options)),
       listed_(device, num_macrocells(grid_)),
       request_(device, gradients_) {
@@ -112,15 +112,14 @@ std::uint64_t SurfaceBlocks::count_bytes() const {
 }
 
 std::uint64_t SurfaceBlocks::cache_bytes(std::uint32_t num_slots) const {
-  const BlockCache::Limits limits = cache_limits(grid_, num_slots);
+  const BlockCache::Limits limits = cache_limits(grid_, num_slots, store_.cache.slot_type);
   return BlockCache::sizes(limits).bytes() +
          ZfpDecode::sizes(limits.max_requests(), stream().window != nullptr, false).bytes();
 }
 
 bool SurfaceBlocks::can_have(std::uint32_t num_slots) const {
-  return num_slots <= ISO_MAX_CACHE_SLOTS &&
-         ISO_BLOCK_VOXELS * sizeof(float) * std::uint64_t{num_slots} <=
-             store_.device.capabilities().largest_allocation;
+  return num_slots <= ISO_MAX_CACHE_SLOTS && slot_bytes(store_.cache.slot_type) * num_slots <=
+                                                 store_.device.capabilities().largest_allocation;
 }
 
 std::uint32_t SurfaceBlocks::most_slots(std::uint32_t wanted, std::uint64_t beside) const {
@@ -147,7 +146,7 @@ void SurfaceBlocks::clear_cache() {
 }
 
 void SurfaceBlocks::resize_cache(std::uint32_t num_slots) {
-  store_.resize(cache_limits(grid_, num_slots), rays_);
+  store_.resize(cache_limits(grid_, num_slots, store_.cache.slot_type), rays_);
   num_cached_ = 0;
 }
 

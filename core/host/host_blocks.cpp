@@ -74,7 +74,7 @@ HostValues::HostValues(const CompressedVolume &level, bool is_finest, double vox
     : HostValues(level) {
   const BlockPrecision planes = with_fewer_planes(level.precision, voxel_error);
   min_exponent = planes.min_exponent;
-  whole_numbers = planes.whole_numbers;
+  whole = whole_numbers_of(level.info.type, planes);
   plane_error = isowave::core::plane_error(level.precision, voxel_error);
   if (bound == FieldBound::kNone) return;
   const ValueOffset offset =
@@ -128,11 +128,13 @@ HostBlocks::HostBlocks(const CompressedVolume &volume, HostRoom &room, std::uint
 
 /// As far as decode() needs it, in host memory.
 EncodedBlock HostBlocks::encoded(std::size_t block) const {
+  const WholeNumbers whole = whole_numbers_of(volume_->info.type, volume_->precision);
   return {.words = volume_->words.data(),
           .first_bit = volume_->block_begin(block),
           .num_bits = volume_->block_bits(block),
           .min_exponent = volume_->precision.min_exponent,
-          .whole_numbers = volume_->precision.whole_numbers,
+          .least = whole.least,
+          .greatest = whole.greatest,
           .size_x = 4,
           .size_y = 4,
           .size_z = 4,
@@ -426,7 +428,8 @@ void HostBlocks::decode_once(std::size_t block) {
 void HostBlocks::decode_to(std::size_t block, float *values) const {
   EncodedBlock bits = encoded(block);
   bits.min_exponent = decoded_as_.min_exponent;
-  bits.whole_numbers = decoded_as_.whole_numbers;
+  bits.least = decoded_as_.whole.least;
+  bits.greatest = decoded_as_.whole.greatest;
   std::array<uint, (ISO_MAX_BLOCK_BITS + 31) / 32 + kDecoderAhead> words;
   if (volume_->file) {
     volume_->read_words(bits.first_bit,

@@ -31,11 +31,12 @@ struct HostValues {
              const std::array<float, 2> &value_range);
   /// All bit planes of the volume itself.
   explicit HostValues(const CompressedVolume &level)
-      : min_exponent(level.precision.min_exponent), whole_numbers(level.precision.whole_numbers) {}
+      : min_exponent(level.precision.min_exponent),
+        whole(whole_numbers_of(level.info.type, level.precision)) {}
   bool operator==(const HostValues &) const = default;
 
   std::int32_t min_exponent;
-  bool whole_numbers;
+  WholeNumbers whole;
   double plane_error = 0;       ///< how far values may be from those of all planes
   float uniform = 0, unit = 0;  ///< of ValueOffset
 };

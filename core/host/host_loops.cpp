@@ -9,6 +9,7 @@
 #include "kernels_cl/portable/level_border.h"
 #include "kernels_cl/portable/ray_state.h"
 #include "kernels_cl/portable/smooth_gradient.h"
+#include "kernels_cl/portable/whole_number.h"
 #include "kernels_cl/portable/zfp_codec.h"
 
 // All that a loop calls becomes part of it, and so is compiled for the processor that it is for.
@@ -26,8 +27,9 @@ namespace {
 
 inline void decode(const EncodedBlock &block, float *values) {
   zfp_decode_any_block(block.words, block.first_bit, block.num_bits, block.min_exponent, values);
-  if (block.whole_numbers) {
-    for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v) values[v] = rint(values[v]) + 0.0f;
+  if (block.least <= block.greatest) {
+    for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v)
+      values[v] = whole_number(values[v], block.least, block.greatest);
   }
   if (block.no_data == 0) return;
   for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v) {

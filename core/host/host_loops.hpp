@@ -26,7 +26,7 @@ struct EncodedBlock {
   ulong first_bit;
   uint num_bits;
   int min_exponent;             ///< of BlockPrecision
-  bool whole_numbers;           ///< of BlockPrecision
+  float least, greatest;        ///< of WholeNumbers
   uint size_x, size_y, size_z;  ///< voxels within the volume, 1 to 4
   ulong no_data;                ///< bit x + 4y + 16z: the voxel has no data
 };

@@ -8,11 +8,11 @@ ocl::BufferSizes BlockTriangles::sizes() {
   return {ocl::buffer_size<uchar>("cell triangles", CellTriangles{}.size())};
 }
 
-BlockTriangles::BlockTriangles(ocl::Device &device)
+BlockTriangles::BlockTriangles(ocl::Device &device, SlotType slots)
     : device_(device),
       cell_triangles_(device, sizes()["cell triangles"]),
-      count_(device, group_defines(ISO_BLOCK_VOXELS)),
-      write_(device, group_defines(ISO_BLOCK_VOXELS)) {
+      count_(device, with_slots(group_defines(ISO_BLOCK_VOXELS), slots)),
+      write_(device, with_slots(group_defines(ISO_BLOCK_VOXELS), slots)) {
   cell_triangles_.write(cell_triangles());
 }
 

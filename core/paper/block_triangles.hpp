@@ -12,7 +12,7 @@ namespace isowave::core {
 class BlockTriangles {
  public:
   static ocl::BufferSizes sizes();
-  explicit BlockTriangles(ocl::Device &device);
+  explicit BlockTriangles(ocl::Device &device, SlotType slots = SlotType::kFloat32);
 
   /// Entries of the list that a call is for: from `begin` to below `end`. Lists that have a count
   /// for each entry begin with entry `first`.

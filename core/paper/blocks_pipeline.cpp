@@ -25,8 +25,9 @@ class BlocksWave : public Wave {
         speculation_(blocks.device),
         traverse_(blocks.device, limits.num_rays, limits.group_size, options.scanned_pairs),
         group_(blocks.device, limits, options.closest),
-        intersect_(blocks.device, limits.num_rays, limits.group_size, solver, options.closest),
-        composite_(blocks.device, limits.num_rays, options.closest) {
+        intersect_(blocks.device, limits.num_rays, limits.group_size, solver, options.closest,
+                   blocks.cache.slot_type),
+        composite_(blocks.device, limits.num_rays, options.closest, blocks.cache.slot_type) {
     blocks.on_resize = [this](std::uint32_t num_slots) { group_.resize(num_slots); };
   }
   BlocksWave(const BlocksWave &) = delete;

@@ -2,9 +2,10 @@
 
 namespace isowave::core {
 
-Composite::Composite(ocl::Device &device, std::uint64_t num_rays, ClosestHit closest)
+Composite::Composite(ocl::Device &device, std::uint64_t num_rays, ClosestHit closest,
+                     SlotType slots)
     : range_(ocl::Range::strided(num_rays, ocl::kGroupSize, device)),
-      kernel_(device, closest_defines(closest)) {}
+      kernel_(device, with_slots(closest_defines(closest), slots)) {}
 
 void Composite::operator()(const BlockCache &cache, Wavefront &rays, Compaction &compaction) {
   kernel_(range_, rays.frame, rays.counts, rays.active_ray_ids, rays.pair_block_ids,

@@ -12,7 +12,8 @@ namespace isowave::core {
 
 class Composite {
  public:
-  Composite(ocl::Device &device, std::uint64_t num_rays, ClosestHit closest = kDefaultClosestHit);
+  Composite(ocl::Device &device, std::uint64_t num_rays, ClosestHit closest = kDefaultClosestHit,
+            SlotType slots = SlotType::kFloat32);
 
   /// In     rays.pair_hits, closest_pairs
   /// Out    rays.hits; ray_block_ids, where rays without slots wait; next_active_ray_ids;

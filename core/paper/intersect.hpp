@@ -13,7 +13,8 @@ namespace isowave::core {
 class Intersect {
  public:
   Intersect(ocl::Device &device, std::uint64_t num_rays, std::uint32_t group_size,
-            Solver solver = kDefaultSolver, ClosestHit closest = kDefaultClosestHit);
+            Solver solver = kDefaultSolver, ClosestHit closest = kDefaultClosestHit,
+            SlotType slots = SlotType::kFloat32);
 
   /// Out    rays.pair_hits of every pair in `groups`; rays.closest_pairs
   /// Waits  no

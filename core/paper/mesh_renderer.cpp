@@ -66,7 +66,7 @@ MeshRenderer::MeshRenderer(ocl::Device &device, const CompressedVolume &volume,
       options_(options),
       volume_(volume),
       blocks_(device, volume, block_options(device, options)),
-      block_triangles_(device),
+      block_triangles_(device, blocks_.cache().slot_type),
       rasterise_(device, options.size.num_rays()),
       shade_(device, options.size.num_rays()),
       size_(options.size) {}

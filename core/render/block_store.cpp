@@ -61,7 +61,8 @@ std::vector<Level> make_levels(ocl::Device &device, const CompressedVolume &volu
   std::vector<Level> levels;
   for (std::size_t i = 0; i < volumes.size(); ++i) {
     const CompressedVolume &level = *volumes[i];
-    ZfpDecode decode(device, plan.limits.cache.max_requests(), streams[i].defines(), has_levels);
+    ZfpDecode decode(device, plan.limits.cache.max_requests(), streams[i].defines(), has_levels,
+                     plan.limits.cache.slot_type);
     levels.push_back({level.info, level.precision, LevelError(level, i == 0), std::move(streams[i]),
                       std::move(macrocells[i]), std::move(decode)});
   }
@@ -71,7 +72,7 @@ std::vector<Level> make_levels(ocl::Device &device, const CompressedVolume &volu
 std::vector<Level> make_level(ocl::Device &device, const CompressedVolume &volume,
                               DeviceStream stream, const BlockCache::Limits &limits) {
   Macrocells macrocells(device, make_grid_params(volume.info), stream);
-  ZfpDecode decode(device, limits.max_requests(), stream.defines());
+  ZfpDecode decode(device, limits.max_requests(), stream.defines(), false, limits.slot_type);
   std::vector<Level> levels;
   levels.push_back({volume.info, volume.precision, LevelError(volume, true), std::move(stream),
                     std::move(macrocells), std::move(decode)});

@@ -137,7 +137,8 @@ DeviceRenderer::DeviceRenderer(ocl::Device &device, const CompressedVolume &volu
       size_(options_.size),
       camera_rays_(
           options_.pipeline->make_wave(blocks_, rays_, blocks_.plan.limits.wave, options_)),
-      smooth_normals_(device, rays_.num_rays, options_.group_size, blocks_.levels.size() > 1),
+      smooth_normals_(device, rays_.num_rays, options_.group_size, blocks_.levels.size() > 1,
+                      blocks_.cache.slot_type),
       normals_of_camera_(blocks_, rays_, smooth_normals_, RaySource::kCamera),
       normals_of_given_(blocks_, rays_, smooth_normals_, RaySource::kGiven),
       shade_(device, options_.size.num_rays()),
@@ -256,7 +257,9 @@ std::vector<DecodedValues> DeviceRenderer::decoded_values(const FrameRequest &re
     const ValueOffset offset = value_offset(level.error, request.bound, few_planes, value_range_);
     StreamLayout layout = level.stream.layout;
     layout.min_exponent = planes.min_exponent;
-    layout.whole_numbers = planes.whole_numbers ? 1 : 0;
+    const WholeNumbers whole = whole_numbers_of(level.info.type, planes);
+    layout.least = whole.least;
+    layout.greatest = whole.greatest;
     layout.value_offset = offset.uniform;
     layout.bound_unit = offset.unit;
     values.push_back({layout, few_planes});

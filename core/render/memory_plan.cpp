@@ -93,8 +93,9 @@ RendererLimits limits_of(const CompressedVolume &volume, const MemoryRequest &re
                .with_pairs = false,
                .num_levels = grids.size(),
                .with_given = request.with_given_rays},
-      .cache = BlockCache::limits_for(make_id_grid(grids), cache_slots, rays,
-                                      request.sparse_table ? 4 : 2),
+      .cache = BlockCache::limits_for(
+          make_id_grid(grids), cache_slots, rays, request.sparse_table ? 4 : 2,
+          slot_type_for(levels_of(volume, request.with_levels), request.with_bounds)),
       .wave = {.num_rays = rays, .num_slots = cache_slots, .group_size = request.group_size},
       .kept_rays = request.kept_rays};
   request.pipeline->add_to(limits.rays);
@@ -272,7 +273,7 @@ MemoryPlan plan_to_grow(const ocl::Device &device, const CompressedVolume &volum
       first_slots != 0 ? first_slots
                        : first_cache_slots(num_blocks, request.num_rays, request.with_given_rays);
   MemoryPlan plan = plan_of(first);
-  const std::uint64_t decoded = ISO_BLOCK_VOXELS * sizeof(float) * volume.block_count();
+  const std::uint64_t decoded = slot_bytes(plan.limits.cache.slot_type) * volume.block_count();
   if (first_slots == 0 && plan.total() > decoded) {  // bytes grow linearly with the slots
     const std::uint64_t slots = plan.cache_slots, least = std::max(slots / kLeastPart, kFewSlots);
     const MemoryPlan smaller = plan_of(least);

@@ -7,7 +7,8 @@ RaysWave::RaysWave(BlockStore &blocks, Wavefront &rays, std::uint32_t group_size
     : blocks_(blocks),
       rays_(rays),
       start_rays_(blocks.device, rays.num_rays, group_size, blocks.levels.size() > 1, source),
-      march_(blocks.device, rays.num_rays, group_size, solver, blocks.levels.size() > 1, source),
+      march_(blocks.device, rays.num_rays, group_size, solver, blocks.levels.size() > 1, source,
+             blocks.cache.slot_type),
       request_ahead_(blocks.device, rays.num_rays, group_size, blocks.levels.size() > 1, source) {
   const ocl::DeviceInfo &device = blocks.device.info();
   const bool in_packets =
@@ -17,7 +18,7 @@ RaysWave::RaysWave(BlockStore &blocks, Wavefront &rays, std::uint32_t group_size
   const DeviceStream &stream = blocks.levels[0].stream;
   if (in_packets && MarchPackets::has(solver) && source == RaySource::kCamera) {
     march_packets_.emplace(blocks.device, rays.num_rays, solver,
-                           decodes && !stream.window ? &stream : nullptr);
+                           decodes && !stream.window ? &stream : nullptr, blocks.cache.slot_type);
   }
 }
 

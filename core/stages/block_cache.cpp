@@ -39,7 +39,7 @@ std::uint32_t BlockCache::Limits::max_requests() const {
 ocl::BufferSizes BlockCache::sizes(const Limits &limits) {
   const std::uint64_t slots = limits.num_slots, requests = limits.max_requests();
   return {ocl::buffer_size<BlockEntry>("block table", 8 * std::uint64_t{table_groups_for(limits)}),
-          ocl::buffer_size<float>("block cache", ISO_BLOCK_VOXELS * slots),
+          ocl::buffer_size<SlotValue>("block cache", slot_bytes(limits.slot_type) * slots),
           ocl::buffer_size<ulong>("voxels inside", slots),
           ocl::buffer_size<uint>("cache slot blocks", slots),
           ocl::buffer_size<uint>("cache slot stamps", slots),
@@ -57,11 +57,12 @@ ocl::BufferSizes BlockCache::sizes(const Limits &limits) {
 BlockCache::BlockCache(ocl::Device &device, const Limits &limits, std::uint32_t group_size,
                        bool levels)
     : BlockCache(device, limits, sizes(limits), group_size,
-                 with_levels(group_defines(group_size), levels)) {}
+                 with_slots(with_levels(group_defines(group_size), levels), limits.slot_type)) {}
 
 BlockCache::BlockCache(ocl::Device &device, const Limits &limits, const ocl::BufferSizes &sizes,
                        std::uint32_t group_size, const ocl::Defines &defines)
-    : num_slots(checked_slots(limits.num_slots)),
+    : slot_type(limits.slot_type),
+      num_slots(checked_slots(limits.num_slots)),
       table_groups(table_groups_for(limits)),
       capacity(limits.max_requests()),
       table(device, sizes["block table"]),

@@ -2,6 +2,7 @@
 // A fixed number of slots for decoded blocks; the least recently used are replaced (Sec. 3.4, 3.5).
 // In: the blocks that a pass requests; out: the list of blocks to decode and their slots.
 
+#include "core/stages/slot_type.hpp"
 #include "core/stages/wavefront.hpp"
 #include "kernels/block_cache.hpp"
 #include "kernels_cl/portable/block_table.h"
@@ -20,6 +21,7 @@ struct BlockCache {
     std::uint64_t num_blocks = 0;              ///< of all levels of detail, by their ids
     std::uint64_t num_macrocells = 0;          ///< of these blocks
     std::uint32_t slot_entries = 2;            ///< of the table, for each slot; a multiple of 2
+    SlotType slot_type = SlotType::kFloat32;
 
     /// The most requests that are listed: no more than can be granted. A ray's block requests at
     /// most 8 blocks, and a block is listed once.
@@ -27,8 +29,10 @@ struct BlockCache {
   };
   /// Limits for the blocks of `grid`: of make_id_grid() if there are several levels of detail.
   static Limits limits_for(const BlockGrid &grid, std::uint32_t num_slots, std::uint64_t num_rays,
-                           std::uint32_t slot_entries = 2) {
-    return {num_slots, num_rays, block_count(grid), core::num_macrocells(grid), slot_entries};
+                           std::uint32_t slot_entries = 2,
+                           SlotType slot_type = SlotType::kFloat32) {
+    return {num_slots,    num_rays, block_count(grid), core::num_macrocells(grid),
+            slot_entries, slot_type};
   }
   static ocl::BufferSizes sizes(const Limits &limits);
 
@@ -82,12 +86,14 @@ struct BlockCache {
   /// Waits   yes
   void resize(const Limits &limits);
 
+  SlotType slot_type;
   std::uint32_t num_slots;
   std::uint32_t table_groups;     ///< Schedule::table_groups
   std::uint32_t capacity;         ///< of the request list: requests beyond it are dropped
   ocl::Buffer<BlockEntry> table;  ///< [8 * table_groups] see kernels_cl/portable/block_table.h
-  ocl::Buffer<float> values;      ///< [num_slots * 64] decoded values, x + 4y + 16z within a slot
-  ocl::Buffer<ulong> inside;      ///< [num_slots] bit x + 4y + 16z: is value >= isovalue?
+  /// [num_slots * 64] decoded values, of slot_type, x + 4y + 16z within a slot
+  ocl::Buffer<SlotValue> values;
+  ocl::Buffer<ulong> inside;         ///< [num_slots] bit x + 4y + 16z: is value >= isovalue?
   ocl::Buffer<uint> slot_block_ids;  ///< [num_slots] block in each slot or ISO_INVALID_ID
   ocl::Buffer<uint>
       slot_stamps;  ///< [num_slots] when it was used last: kernels_cl/device/slot_stamps.h

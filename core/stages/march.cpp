@@ -15,10 +15,11 @@ ocl::Defines march_defines(std::uint32_t group_size, Solver solver) {
 }  // namespace
 
 March::March(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_size, Solver solver,
-             bool levels, RaySource source)
+             bool levels, RaySource source, SlotType slots)
     : source_(source),
       range_(ocl::Range::strided(num_pixels, group_size, device).in_parts(num_pixels, device)),
-      kernel_(device, with_source(march_defines(group_size, solver), source), levels) {}
+      kernel_(device, with_slots(with_source(march_defines(group_size, solver), source), slots),
+              levels) {}
 
 void March::operator()(const Macrocells &macrocells, BlockCache &cache, Wavefront &rays) {
   kernel_.of(rays)(range_, rays.frame, rays.level_frames, rays.num_level_frames, range_.parts,

@@ -14,7 +14,8 @@ class March {
  public:
   /// levels: frames may have several levels of detail.
   March(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_size, Solver solver,
-        bool levels = false, RaySource source = RaySource::kCamera);
+        bool levels = false, RaySource source = RaySource::kCamera,
+        SlotType slots = SlotType::kFloat32);
 
   /// Takes rays further, as far as what was requested in the pass before has been provided.
   ///

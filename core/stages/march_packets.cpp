@@ -39,11 +39,11 @@ bool MarchPackets::may_decode(const ocl::DeviceInfo &device) {
 }
 
 MarchPackets::MarchPackets(ocl::Device &device, std::uint64_t num_pixels, Solver solver,
-                           const DeviceStream *on_demand)
+                           const DeviceStream *on_demand, SlotType slots)
     : on_demand_(on_demand != nullptr),
       range_(range_of(device, num_pixels, on_demand_)),
-      open_(device, packet_defines(solver, on_demand)),
-      march_(device, packet_defines(solver, on_demand)) {}
+      open_(device, with_slots(packet_defines(solver, on_demand), slots)),
+      march_(device, with_slots(packet_defines(solver, on_demand), slots)) {}
 
 void MarchPackets::operator()(const Macrocells &macrocells, const DeviceStream &stream,
                               BlockCache &cache, Wavefront &rays) {

@@ -27,7 +27,7 @@ class MarchPackets {
   /// on_demand   the stream that rays decode blocks from when they come to them; null: they wait
   ///             for blocks until the next pass. Whole on the device
   MarchPackets(ocl::Device &device, std::uint64_t num_pixels, Solver solver,
-               const DeviceStream *on_demand = nullptr);
+               const DeviceStream *on_demand = nullptr, SlotType slots = SlotType::kFloat32);
 
   /// Begins a frame, of the finest level of detail and rays of the camera.
   ///

@@ -37,12 +37,12 @@ ocl::BufferSizes MarchingCubes::sizes() {
   return {ocl::buffer_size<uchar>("cell triangles", CellTriangles{}.size())};
 }
 
-MarchingCubes::MarchingCubes(ocl::Device &device, Gradients gradients)
+MarchingCubes::MarchingCubes(ocl::Device &device, Gradients gradients, SlotType slots)
     : device_(device),
       with_gradients_(gradients == Gradients::kSmooth ? 1 : 0),
       cell_triangles_(device, sizes()["cell triangles"]),
-      count_(device, group_defines(ISO_BLOCK_VOXELS)),
-      write_(device, group_defines(ISO_BLOCK_VOXELS)) {
+      count_(device, with_slots(group_defines(ISO_BLOCK_VOXELS), slots)),
+      write_(device, with_slots(group_defines(ISO_BLOCK_VOXELS), slots)) {
   cell_triangles_.write(cell_triangles());
 }
 

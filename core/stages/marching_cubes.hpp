@@ -44,7 +44,7 @@ struct MeshBuffers {
 class MarchingCubes {
  public:
   static ocl::BufferSizes sizes();
-  MarchingCubes(ocl::Device &device, Gradients gradients);
+  MarchingCubes(ocl::Device &device, Gradients gradients, SlotType slots = SlotType::kFloat32);
 
   /// Counts the vertices and triangles of entries [begin, end) of the list.
   ///

@@ -3,9 +3,9 @@
 namespace isowave::core {
 
 SmoothNormals::SmoothNormals(ocl::Device &device, std::uint64_t num_pixels,
-                             std::uint32_t group_size, bool levels)
+                             std::uint32_t group_size, bool levels, SlotType slots)
     : range_(ocl::Range::strided(num_pixels, group_size, device, 4).in_parts(num_pixels, device)),
-      kernel_(device, group_defines(group_size), levels) {}
+      kernel_(device, with_slots(group_defines(group_size), slots), levels) {}
 
 void SmoothNormals::operator()(BlockCache &cache, Wavefront &rays, bool begins, RaySource of) {
   kernel_.of(rays)(range_, rays.frame, rays.level_frames, rays.num_level_frames, range_.parts,

@@ -11,7 +11,7 @@ class SmoothNormals {
  public:
   /// levels: frames may have several levels of detail.
   SmoothNormals(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_size,
-                bool levels = false);
+                bool levels = false, SlotType slots = SlotType::kFloat32);
 
   /// The hits whose blocks are cached get their gradients; rays of the others ask for blocks, as
   /// far as they are in the pass's window.

@@ -22,11 +22,11 @@ ocl::BufferSizes ZfpDecode::sizes(std::uint64_t max_blocks, bool stream_on_host,
 }
 
 ZfpDecode::ZfpDecode(ocl::Device &device, std::uint64_t max_blocks,
-                     const ocl::Defines &stream_defines, bool levels)
+                     const ocl::Defines &stream_defines, bool levels, SlotType slots)
     : device_(device),
       stream_defines_(stream_defines),
       range_(ocl::Range::strided(max_blocks, ocl::kGroupSize, device)),
-      kernel_(device, all_defines(stream_defines, levels)) {
+      kernel_(device, with_slots(all_defines(stream_defines, levels), slots)) {
   const bool stream_on_host = DeviceStream::is_window(stream_defines);
   if (stream_on_host && levels)
     places_.emplace(device, sizes(max_blocks, stream_on_host, levels)["decode places"]);
@@ -58,7 +58,7 @@ bool ZfpDecode::can_join(const DeviceStream &next) const {
 
 void ZfpDecode::decode(const Source &source, const Source &next, const CountsBuffer &counts,
                        const ocl::Buffer<uint> &block_ids, const ocl::Buffer<uint> &slots,
-                       ocl::Buffer<float> &values, ocl::Buffer<ulong> &inside) {
+                       ocl::Buffer<SlotValue> &values, ocl::Buffer<ulong> &inside) {
   const DeviceStream &stream = source.stream;
   if (stream.defines() != stream_defines_) {
     throw std::invalid_argument("ZfpDecode was built for a stream in another number of parts");

@@ -1,5 +1,5 @@
 #pragma once
-// New blocks -> 4^3 float32 values in their cache slots (Sec. 3.5).
+// New blocks -> 4^3 values in their cache slots (Sec. 3.5).
 
 #include <optional>
 #include <span>
@@ -20,7 +20,7 @@ class ZfpDecode {
   /// levels          block ids count on through several levels of detail (LevelPlace), and only
   ///                 blocks of the levels at hand are decoded
   ZfpDecode(ocl::Device &device, std::uint64_t max_blocks, const ocl::Defines &stream_defines = {},
-            bool levels = false);
+            bool levels = false, SlotType slots = SlotType::kFloat32);
 
   /// Up to so many blocks from now on: as BlockCache::resize().
   void resize(std::uint64_t max_blocks);
@@ -39,12 +39,12 @@ class ZfpDecode {
   /// Decodes blocks to slots of a cache. Bit-exact with libzfp.
   ///
   /// In      block_ids, slots [counts.decoded_count]
-  /// Out     values [64 * slots], x + 4y + 16z within a slot; inside [slots], a bit for each voxel
-  /// Throws  Error: the stream stays on the host, and the volume's file has become shorter
-  /// Waits   if the stream stays on the host, for all that is enqueued
+  /// Out     values [64 * slots], of the slots' type, x + 4y + 16z within a slot; inside [slots], a
+  /// bit for each voxel Throws  Error: the stream stays on the host, and the volume's file has
+  /// become shorter Waits   if the stream stays on the host, for all that is enqueued
   void operator()(const DeviceStream &stream, const FrameParams &frame, const CountsBuffer &counts,
                   const ocl::Buffer<uint> &block_ids, const ocl::Buffer<uint> &slots,
-                  ocl::Buffer<float> &values, ocl::Buffer<ulong> &inside) {
+                  ocl::Buffer<SlotValue> &values, ocl::Buffer<ulong> &inside) {
     const Source source{stream, frame};
     decode(source, source, counts, block_ids, slots, values, inside);
   }
@@ -59,7 +59,7 @@ class ZfpDecode {
  private:
   void decode(const Source &source, const Source &next, const CountsBuffer &counts,
               const ocl::Buffer<uint> &block_ids, const ocl::Buffer<uint> &slots,
-              ocl::Buffer<float> &values, ocl::Buffer<ulong> &inside);
+              ocl::Buffer<SlotValue> &values, ocl::Buffer<ulong> &inside);
   std::size_t take_own(std::span<uint> block_ids, const FrameParams &frame);
 
   ocl::Device &device_;

@@ -11,10 +11,12 @@ namespace isowave::core {
 namespace {
 
 StreamLayout layout_of(const CompressedVolume &volume, std::uint32_t words_per_part) {
+  const WholeNumbers whole = whole_numbers_of(volume.info.type, volume.precision);
   return {volume.bits_per_block,
           words_per_part,
           volume.precision.min_exponent,
-          volume.precision.whole_numbers ? 1u : 0u,
+          whole.least,
+          whole.greatest,
           0.0f,
           0.0f,
           0,

@@ -1,7 +1,5 @@
 #include "core/zfp/block_decoder.hpp"
 
-#include <cmath>
-
 #include "kernels_cl/portable/zfp_codec.h"
 
 namespace isowave::core {
@@ -19,9 +17,7 @@ void BlockDecoder::decode(std::uint64_t id, std::span<float, ISO_BLOCK_VOXELS> v
   const std::vector<std::uint32_t> &words = volume_.file ? read_ : volume_.words;
   zfp_decode_any_block(words.data(), volume_.block_begin(id) - first_bit_, volume_.block_bits(id),
                        volume_.precision.min_exponent, voxels.data());
-  if (volume_.precision.whole_numbers) {
-    for (float &voxel : voxels) voxel = std::rint(voxel) + 0.0f;  // as the kernels do
-  }
+  round_to(whole_numbers_of(volume_.info.type, volume_.precision), voxels);
   clear_no_data(volume_.no_data.mask(id), voxels);
 }
 

@@ -191,9 +191,7 @@ float largest_bound(const BlockBounds &bounds) {
 double plane_error(const BlockPrecision &bound, double voxel_error) {
   const BlockPrecision fewer = with_fewer_planes(bound, voxel_error);
   if (fewer.min_exponent == bound.min_exponent) return 0;
-  // Values of all planes are rounded to integers, if they are meant to be, and those of fewer are
-  // not.
-  return std::ldexp(1.0, fewer.min_exponent) + (bound.whole_numbers ? 0.5 : 0.0);
+  return std::ldexp(1.0, fewer.min_exponent);
 }
 
 ValueOffset value_offset(const LevelError &error, FieldBound bound, double plane_error,

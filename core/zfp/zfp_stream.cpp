@@ -12,6 +12,7 @@
 #include "core/zfp/libzfp.hpp"
 #include "core/zfp/pyramid_coder.hpp"
 #include "core/zfp/zfp_file.hpp"
+#include "kernels_cl/portable/whole_number.h"
 
 namespace isowave::core {
 
@@ -132,7 +133,21 @@ BlockPrecision with_fewer_planes(const BlockPrecision &bound, double voxel_error
     throw Error("a voxel error of {} cannot be allowed: give 0 or more", voxel_error);
   const std::int32_t min_exponent = voxel_error > 0 ? std::ilogb(voxel_error) : ISO_ALL_PLANES;
   if (min_exponent <= bound.min_exponent || bound.is_reversible()) return bound;
-  return {min_exponent, false, {}};  // rounding would only add to the error
+  if (bound.whole_numbers && min_exponent < 0) return bound;
+  return {min_exponent, bound.whole_numbers, {}};
+}
+
+WholeNumbers whole_numbers_of(VoxelType type, const BlockPrecision &precision) {
+  if (!precision.whole_numbers) return {};
+  return with_voxel_type(type, [](auto of_type) {
+    using Limits = std::numeric_limits<decltype(of_type)>;
+    return WholeNumbers{static_cast<float>(Limits::lowest()), static_cast<float>(Limits::max())};
+  });
+}
+
+void round_to(const WholeNumbers &whole, std::span<float> values) {
+  if (whole.least > whole.greatest) return;
+  for (float &value : values) value = whole_number(value, whole.least, whole.greatest);
 }
 
 namespace {
@@ -177,9 +192,7 @@ std::vector<float> decode_with_libzfp(const CompressedVolume &volume, double vox
         stream.get(), voxel + at.x + std::ptrdiff_t{dims.x} * at.y + layer * at.z, size.x, size.y,
         size.z, 1, dims.x, layer);
   }
-  if (bound.whole_numbers) {
-    for (float &value : voxels) value = std::rint(value) + 0.0f;  // as the kernels do
-  }
+  round_to(whole_numbers_of(volume.info.type, bound), voxels);
   for (std::uint64_t id = 0; !volume.no_data.empty() && id < volume.block_count(); ++id) {
     const glm::uvec3 at =
         4u * glm::uvec3(id % blocks.x, id / blocks.x % blocks.y, id / blocks.x / blocks.y);

@@ -44,8 +44,17 @@ struct BlockPrecision {
 };
 
 /// Drops the bit planes that an error of at most voxel_error allows to leave out. 0 drops none.
-/// Blocks of reversible streams can spare none.
+/// Blocks of reversible streams can spare none. Whole numbers stay whole: no error is below 1.
 BlockPrecision with_fewer_planes(const BlockPrecision &bound, double voxel_error);
+
+/// The integers that decoded values are rounded to (kernels_cl/portable/whole_number.h).
+struct WholeNumbers {
+  float least = 1, greatest = 0;  ///< least > greatest: values are not rounded
+  bool operator==(const WholeNumbers &) const = default;
+};
+/// Those of blocks of this precision in a volume of this type.
+WholeNumbers whole_numbers_of(VoxelType type, const BlockPrecision &precision);
+void round_to(const WholeNumbers &whole, std::span<float> values);
 
 struct CompressOptions {
   std::uint32_t rate = 0;  ///< bits per voxel, 1..32; or

@@ -18,6 +18,7 @@
 #include "portable/block_bound.h"
 #include "portable/block_index.h"
 #include "portable/no_data.h"
+#include "portable/whole_number.h"
 #include "portable/zfp_codec.h"
 
 #ifndef ISO_STREAM_PARTS
@@ -60,13 +61,10 @@ ISO_INLINE void decode_block(global const uint *part_0, global const uint *part_
   } else {
     zfp_decode_block(words, first_bit, bits, layout.min_exponent, values);
   }
-  if (layout.whole_numbers != 0u) {
+  if (layout.least <= layout.greatest) {
     ISO_UNROLL
-    for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v) {
-      const uint rounded = as_uint(rint(values[v]));
-      values[v] = as_float(
-          rounded == 0x80000000u ? 0u : rounded); /* no integer is -0; llvmpipe drops a + 0.0f */
-    }
+    for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v)
+      values[v] = whole_number(values[v], layout.least, layout.greatest);
   }
   if (layout.value_offset != 0.0f || layout.bound_unit != 0.0f) {
     float bound = 0.0f;

@@ -4,11 +4,12 @@
 #define ISOWAVE_CACHED_CELL_H
 
 #include "portable/block_table.h"
+#include "slot_values.h"
 
 /// The corners of dual cell (x,y,z) from the cache, minus the isovalue; corner x + 2y + 4z. All its
 /// blocks are cached.
 ISO_INLINE void load_corners(const FrameParams *frame, global const BlockEntry *table,
-                             global const float *cache_values, int x, int y, int z, float *w) {
+                             global const SlotValue *cache_values, int x, int y, int z, float *w) {
   for (int corner = 0; corner < 8; ++corner) {
     const uint vx = (uint)(x + (corner & 1)), vy = (uint)(y + (corner >> 1 & 1)),
                vz = (uint)(z + (corner >> 2));

@@ -7,12 +7,13 @@
 #include "portable/block_cells.h"
 #include "portable/block_table.h"
 #include "portable/cell_intersect.h"
+#include "slot_values.h"
 
 /// The cache (block_cache.cl), as a work-item looks into it.
 typedef struct CacheReader {
   global BlockEntry *table;
   global const ulong *inside;
-  global const float *values;
+  global const SlotValue *values;
   global uint *slot_stamps;
   uint stamp;         ///< read_stamp() of the pass: the stamp of every cached block that is opened
   local uint *slots;  ///< scratch for the slots of a dual grid: 8, ISO_GROUP_SIZE apart

@@ -18,6 +18,7 @@
 
 #include "block_requests.h"
 #include "block_stream.h"
+#include "slot_values.h"
 
 #ifndef ISO_DEMAND_PATIENCE
 #define ISO_DEMAND_PATIENCE 20000u  ///< looks at the mark of another: some ten microseconds
@@ -29,7 +30,7 @@ typedef struct BlockMaker {
   StreamLayout layout;
   float isovalue;
   global BlockEntry *table;
-  global float *values;
+  global SlotValue *values;
   global ulong *inside;
   global uint *slot_block_ids, *slot_stamps, *requested_bits;
   global const uint *free_slots;
@@ -76,7 +77,7 @@ ISO_INLINE void make_block(BlockMaker *maker, const FrameParams *frame, BlockCoo
   decode_block(maker->part_0, maker->part_1, maker->part_2, maker->part_3, maker->index,
                maker->layout, block_id, 0, values);
   for (v = 0; v < ISO_BLOCK_VOXELS; ++v) {
-    maker->values[slot * ISO_BLOCK_VOXELS + v] = values[v];
+    maker->values[slot * ISO_BLOCK_VOXELS + v] = (SlotValue)values[v];
     inside |= (ulong)(values[v] - maker->isovalue >= 0.0f) << v;
   }
   maker->inside[slot] = inside;

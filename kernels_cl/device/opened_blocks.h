@@ -31,7 +31,7 @@ ISO_INLINE uint opened_place(BlockCoords b) {
 }
 
 /// Copies the voxels of a corner of the dual grid to their places in it.
-ISO_INLINE void copy_corner(global const float *values, uint corner, float *voxels) {
+ISO_INLINE void copy_corner(global const SlotValue *values, uint corner, float *voxels) {
   const uint rows = (corner & 2u) != 0 ? 1 : 4, layers = (corner & 4u) != 0 ? 1 : 4;
   float *to = voxels + ((corner & 1u) != 0 ? 4 : 0) + ((corner & 2u) != 0 ? 20 : 0) +
               ((corner & 4u) != 0 ? 100 : 0);
@@ -40,7 +40,7 @@ ISO_INLINE void copy_corner(global const float *values, uint corner, float *voxe
       if ((corner & 1u) != 0)
         to[5 * y + 25 * z] = values[4 * y + 16 * z];
       else
-        vstore4(vload4(y + 4 * z, values), 0, to + 5 * y + 25 * z);
+        vstore4(convert_float4(vload4(y + 4 * z, values)), 0, to + 5 * y + 25 * z);
     }
   }
 }

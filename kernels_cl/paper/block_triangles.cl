@@ -6,6 +6,7 @@
 /// Triangles that are only drawn need no more than that: no neighbour's vertices, and no gradients.
 /// marching_cubes.cl makes meshes whose triangles share their vertices.
 #include "device/dual_grid_inside.h"
+#include "device/slot_values.h"
 #include "device/work_group.h"
 #include "portable/block_vertex.h"
 #include "portable/cells_with_data.h"
@@ -36,14 +37,14 @@ kernel void block_triangles_count(const FrameParams frame_params, uint begin, ui
 }
 
 /// Voxel (x,y,z) of a dual grid, 0 to 4 along each axis. slots [8]: of its blocks.
-ISO_INLINE float dual_grid_voxel(local const uint *slots, global const float *values, uint x,
+ISO_INLINE float dual_grid_voxel(local const uint *slots, global const SlotValue *values, uint x,
                                  uint y, uint z) {
   const uint slot = slots[(x >> 2) + 2 * (y >> 2) + 4 * (z >> 2)];
   return values[slot * ISO_BLOCK_VOXELS + (x & 3) + 4 * (y & 3) + 16 * (z & 3)];
 }
 
 /// The vertex on an edge of cell (x,y,z) of a block.
-ISO_INLINE uint edge_steps(local const uint *slots, global const float *values, float isovalue,
+ISO_INLINE uint edge_steps(local const uint *slots, global const SlotValue *values, float isovalue,
                            uint x, uint y, uint z, uint edge) {
   const uint corner = edge_corner(edge), axis = edge_axis(edge);
   const uint lx = x + (corner & 1), ly = y + (corner >> 1 & 1), lz = z + (corner >> 2);
@@ -64,9 +65,10 @@ ISO_INLINE uint edge_steps(local const uint *slots, global const float *values, 
 /// Launch   groups of up to 64, which stride over entries
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void block_triangles_write(
     const FrameParams frame_params, uint begin, uint end, uint first, uint skipped,
-    global const uint *block_ids, global const BlockEntry *table, global const float *cache_values,
-    global const ulong *inside, global const uchar *cell_triangles, global const uint *index,
-    uint no_data_begin, global const uint *offsets, global BlockVertex *vertices) {
+    global const uint *block_ids, global const BlockEntry *table,
+    global const SlotValue *cache_values, global const ulong *inside,
+    global const uchar *cell_triangles, global const uint *index, uint no_data_begin,
+    global const uint *offsets, global BlockVertex *vertices) {
   const FrameParams *frame = &frame_params;
   const BlockGrid grid = frame_params.grid;
   const NoDataTable no_data = {index, no_data_begin};

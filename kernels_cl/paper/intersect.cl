@@ -42,7 +42,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void intersec
     const FrameParams frame_params, uint parts, global const PassCounts *counts,
     global const uint *pair_ids, global const BlockRays *block_rays,
     global const uint *pair_block_ids, global const BlockEntry *table,
-    global const float *cache_values, global const uint *active_ray_ids,
+    global const SlotValue *cache_values, global const uint *active_ray_ids,
     global const uint *pair_rays, global PairHit *pair_hits, global uint *closest_pairs) {
   const FrameParams *frame = &frame_params;
   local float dual_grid[ISO_DUAL_GRID_VERTICES];
@@ -91,7 +91,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void intersec
 kernel void settle_doubts(const FrameParams frame_params, uint parts,
                           global const PassCounts *counts, global const uint *pair_ids,
                           global const uint *pair_block_ids, global const BlockEntry *table,
-                          global const float *cache_values, global const uint *active_ray_ids,
+                          global const SlotValue *cache_values, global const uint *active_ray_ids,
                           global const uint *pair_rays, global PairHit *pair_hits,
                           global uint *closest_pairs) {
   const FrameParams *frame = &frame_params;

@@ -239,7 +239,9 @@ typedef struct StreamLayout {
   uint words_per_part;  ///< of a stream in several buffers: see block_stream.h
   int min_exponent;  ///< bit planes end where the error is at most 2^min_exponent; ISO_ALL_PLANES:
                      ///< with the block's bits; ISO_REVERSIBLE
-  uint whole_numbers;  ///< not 0: decoded values are rounded to integers
+  /// Decoded values are rounded to integers in this range (whole_number.h); least > greatest: they
+  /// are not rounded.
+  float least, greatest;
   /// Added to a block's values, to draw a bound of the volume: value_offset + bound_unit *
   /// block_bound() of its code, of codes that begin with word bounds_begin of the index. Both 0:
   /// nothing.
@@ -249,7 +251,7 @@ typedef struct StreamLayout {
   uint no_data_begin;    ///< word of the index that the table of no_data.h begins with;
                          ///< ISO_INVALID_ID: all voxels have data. Only read if ISO_NO_DATA is 1
 } StreamLayout;
-ISO_CHECK_SIZE(StreamLayout, 36);
+ISO_CHECK_SIZE(StreamLayout, 40);
 
 /// Values of some voxels of a block (macrocells.cl).
 typedef struct VoxelRange {

@@ -1,0 +1,33 @@
+#pragma once
+// The type of the values in cache slots: a volume that has only the values of a short integer type
+// takes a quarter or half of the memory, and of the cache lines, that float32 takes.
+
+#include <cstdint>
+#include <span>
+
+#include "core/ocl/kernel.hpp"
+#include "core/zfp/zfp_stream.hpp"
+
+namespace isowave::core {
+
+enum class SlotType : std::uint8_t { kFloat32, kUint8, kInt8, kUint16, kInt16 };
+
+/// A byte of a slot. Kernels read and write values of a SlotType (kernels_cl/device/slot_values.h).
+struct SlotValue {
+  std::uint8_t byte;
+};
+
+/// Bytes of a slot.
+std::uint64_t slot_bytes(SlotType type);
+
+/// Adds the macros of kernels that read or write cached values.
+ocl::Defines with_slots(ocl::Defines defines, SlotType type);
+
+/// The smallest type that holds every value which blocks of these levels are decoded to, whatever
+/// bit planes a frame leaves out.
+///
+/// with_bounds  bounds of blocks' errors are added to their values
+SlotType slot_type_for(std::span<const CompressedVolume *const> levels, bool with_bounds);
+SlotType slot_type_for(const CompressedVolume &volume);
+
+}  // namespace isowave::core
