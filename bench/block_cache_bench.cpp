@@ -4,6 +4,9 @@
 //   request_cold  every block that the pairs' dual grids need is missing
 //   request_warm  every one is cached
 //   assign        slots for all of them, each taken from a block that was used in the pass before
+//   classify      voxels inside of the cached blocks, for another isovalue
+//   touched       cached blocks that the pass has used are counted
+//   clear         every block is forgotten
 
 #include <algorithm>
 #include <utility>
@@ -65,6 +68,10 @@ class CacheInput {
     cache_.assign(rays_.counts, rays_);
     requested_ = false;
   }
+  void classify() { cache_.classify(rays_); }
+  void count_touched() { cache_.count_touched(rays_, true); }
+  void clear() { cache_.clear(); }
+  double num_entries() const { return 8.0 * cache_.table_groups; }
   /// Gives slots to requests that have none yet.
   void settle() {
     if (requested_) assign();
@@ -92,7 +99,7 @@ class CacheInput {
   bool requested_ = false;
 };
 
-enum class Part { kRequestCold, kRequestWarm, kAssign };
+enum class Part { kRequestCold, kRequestWarm, kAssign, kClassify, kTouched, kClear };
 
 void use_cache(benchmark::State &state, Part part, Distribution distribution) {
   const std::int64_t num_pairs = pixels_of_width(state.range(0));
@@ -105,6 +112,24 @@ void use_cache(benchmark::State &state, Part part, Distribution distribution) {
     };
     // Read: stamps, requests, victims. Written: victims, both page table entries, slot, stamp.
     measure(state, {needed, 32 * needed}, prepare, [&] { in.assign(); });
+  } else if (part == Part::kClassify) {
+    // Read: values, blocks of slots. Written: bits of voxels, changing cells of the table.
+    const double bytes =
+        needed * double(slot_bytes(SlotType::kFloat32) + sizeof(uint) + 8) + 8 * in.num_entries();
+    measure(
+        state, {needed, bytes}, [] {}, [&] { in.classify(); });
+  } else if (part == Part::kTouched) {
+    measure(
+        state, {needed, 8 * needed}, [] {}, [&] { in.count_touched(); });
+  } else if (part == Part::kClear) {
+    // Written: the table, and block, stamp and place in the list of free slots of each slot.
+    const auto fill = [&] {
+      in.open_pass(true);
+      in.request();
+      in.settle();
+    };
+    measure(state, {needed, 12 * needed + sizeof(BlockEntry) * in.num_entries()}, fill,
+            [&] { in.clear(); });
   } else {
     const bool cold = part == Part::kRequestCold;
     measure(
@@ -113,13 +138,16 @@ void use_cache(benchmark::State &state, Part part, Distribution distribution) {
   state.counters["blocks"] = needed;
 }
 
-/// One input serves three benchmarks: they are registered together.
+/// One input serves all benchmarks: they are registered together.
 void register_parts(Distribution distribution, std::int64_t width, std::int64_t key_bits) {
   for (const auto &[part, name] : {std::pair(Part::kRequestCold, "request_cold"),
                                    {Part::kRequestWarm, "request_warm"},
-                                   {Part::kAssign, "assign"}}) {
-    if (part == Part::kAssign && distribution == Distribution::kHot)
-      continue;  // 8 blocks: launches, no work
+                                   {Part::kAssign, "assign"},
+                                   {Part::kClassify, "classify"},
+                                   {Part::kTouched, "touched"},
+                                   {Part::kClear, "clear"}}) {
+    const bool is_request = part == Part::kRequestCold || part == Part::kRequestWarm;
+    if (!is_request && distribution == Distribution::kHot) continue;  // 8 blocks: launches, no work
     stage_benchmark(fmt::format("block_cache/{}/{}", name, to_string(distribution)),
                     [part = part, distribution](benchmark::State &state) {
                       use_cache(state, part, distribution);
