@@ -227,16 +227,25 @@ def time(run):
     return rows
 
 
+# Cases of every stem of kernels_cl.
 KERNELS = (
-    "zfp_decode/.*rate:(1|4|16)",
-    "zfp_encode/.*rate:4",
-    "group/.*slot_bits:18/visible_bits:14",
-    "radix_sort/.*key_bits:18",
+    "(active_blocks|block_triangles|marching_cubes|noise_field|request_surface)/.*edge:256",
+    "(ambient|hit_positions|initial_rays|kept_picture|march|request_ahead|resident)/.*width:1280",
+    "(march_packets|shade|smooth_normals|start_rays)/.*width:1280",
+    "block_cache/.*(uniform|hot)/width:1280/key_bits:18",
     "composite/.*width:1280.*n_spec:(1|64)/",
-    "march",
-    "start_rays",
-    "request_ahead",
+    "group/.*slot_bits:18/visible_bits:14",
+    "intersect/width:1280",
     "macrocells/.*rate:4",
+    "prefix_sum/entries:1048576",
+    "radix_sort/.*key_bits:18",
+    "rasterise/edge:256/width:1280",
+    "scan/(exclusive/entries:1800|.*width:1280)",
+    "speculation",
+    "traverse/width:1280/edge:256/n_spec:8/",
+    "zfp_decode/.*rate:(1|4|16)",
+    "zfp_decode/whole_numbers",
+    "zfp_encode/.*rate:4",
 )
 
 
@@ -256,7 +265,10 @@ def kernels(run):
             continue
         name = re.sub("/(manual_time|real_time|iterations:[0-9]+)", "", case["name"])
         ms = case["real_time"] * to_ms[case["time_unit"]]
-        rows.append({"name": name, "ms": ms, "items_per_second": case.get("items_per_second")})
+        row = {"name": name, "ms": ms}
+        for kept in ("items_per_second", "bytes_per_second", "of_ceiling_%"):
+            row[kept] = case.get(kept)
+        rows.append(row)
     return rows
 
 

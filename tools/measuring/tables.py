@@ -188,10 +188,21 @@ def time(rows):
 
 
 def kernels(rows):
-    yield "case of `isowave_bench`", "ms", "G items/s"
+    yield "case of `isowave_bench`", "ms", "G items/s", "GB/s", "of the ceiling"
     for row in rows:
-        rate = row["items_per_second"]
-        yield f"`{row['name']}`", f"{row['ms']:.3f}", f"{rate / 1e9:.2f}" if rate else ""
+
+        def per_second(key, digits):
+            rate = row.get(key)
+            return f"{rate / 1e9:.{digits}f}" if rate else ""
+
+        share = row.get("of_ceiling_%")
+        yield (
+            f"`{row['name']}`",
+            f"{row['ms']:.3f}",
+            per_second("items_per_second", 2),
+            per_second("bytes_per_second", 1),
+            f"{share:.1f} %" if share else "",
+        )
 
 
 def watertight(rows):
