@@ -17,16 +17,22 @@ namespace isowave::core::bench {
 
 namespace {
 
+/// The voxels in the volume's own type, which float32 holds.
+std::vector<std::byte> in_own_type(const VoxelsInMemory &voxels) {
+  return with_voxel_type(voxels.info.type, [&]<class T>(T) {
+    const std::vector<T> own(voxels.values.begin(), voxels.values.end());
+    const auto bytes = std::as_bytes(std::span(own));
+    return std::vector<std::byte>(bytes.begin(), bytes.end());
+  });
+}
+
 /// Compresses the voxels, at a fixed rate on the device.
 CompressedVolume compress_voxels(const VoxelsInMemory &voxels, std::optional<std::uint32_t> rate,
                                  ocl::Device &device, bool measure_error) {
-  VolumeInfo as_float = voxels.info;
-  as_float.type = VoxelType::kFloat32;
+  const std::vector<std::byte> bytes = in_own_type(voxels);
   Storage storage{.rate = rate, .exact = !rate, .measure_error = measure_error};
   if (rate) storage.encoder = encoder_on(device);
-  const auto open = [&] {
-    return std::make_unique<MemoryReader>(as_float, std::as_bytes(std::span(voxels.values)));
-  };
+  const auto open = [&] { return std::make_unique<MemoryReader>(voxels.info, bytes); };
   return compress_volume(open, "the volume", storage);
 }
 
