@@ -33,10 +33,10 @@ CompressedVolume repeated_volume(std::int64_t rate) {
 enum class Order { kSequential, kSorted, kRandom };
 
 struct DecodeInput {
-  /// Of the real stream, as often as there are copies.
+  /// Decodes the real stream, as often as there are copies.
   DecodeInput(ocl::Device &device, std::int64_t rate, Order order)
       : DecodeInput(device, repeated_volume(rate), kCopies, order, SlotType::kFloat32) {}
-  /// Of blocks that have lengths of their own; the list has each several times.
+  /// Decodes blocks that have lengths of their own; the list has each several times.
   DecodeInput(ocl::Device &device, SlotType slot_type)
       : DecodeInput(device, exact_mixing_layer(kEdge), 1, Order::kSorted, slot_type) {}
 
