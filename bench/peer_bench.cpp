@@ -347,7 +347,7 @@ void compare(const Options &options, const std::string &command, const std::stri
   fmt::print(
       "\nmesh_low, mesh_medium: Flying Edges of VTK, tree (build quality low, medium) and rays of\n"
       "Embree on all processors; rays, blocks: our pipelines; host: ours without OpenCL. Median\n"
-      "(min..max) over rounds and isovalues. new isovalue: from there to the finished hits, "
+      "(min..max) over rounds and isovalues. new isovalue: from there to the picture, "
       "nothing\n"
       "decoded before; cache kept: with what the isovalue before left decoded; warm: the same "
       "view\n"

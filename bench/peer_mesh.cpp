@@ -65,10 +65,25 @@ struct Packet16 {
   }
 };
 
-/// Traces one packet whose first pixel is (x0,y0); returns its hits.
+/// A picture [height][width][3] of the isosurface's color, lit from the eye.
+struct Picture {
+  ImageSize size;
+  std::vector<std::uint8_t> rgb = std::vector<std::uint8_t>(3 * size.num_pixels());
+
+  /// light: 0 to 1; negative: the background.
+  void set(std::uint32_t x, std::uint32_t y, float light) {
+    constexpr std::array<float, 3> kSurface = {240, 210, 160}, kBackground = {26, 26, 33};
+    std::uint8_t *pixel = rgb.data() + 3 * (std::size_t{size.width} * y + x);
+    for (std::size_t c = 0; c < 3; ++c)
+      pixel[c] = static_cast<std::uint8_t>(light < 0 ? kBackground[c] : light * kSurface[c]);
+  }
+};
+
+/// Traces one packet whose first pixel is (x0,y0), and shades it; returns its hits.
 template <class Packet>
-std::uint64_t trace_packet(RTCScene scene, const PixelRays &pixels, ImageSize size,
+std::uint64_t trace_packet(RTCScene scene, const PixelRays &pixels, Picture &picture,
                            std::uint32_t x0, std::uint32_t y0) {
+  const ImageSize size = picture.size;
   constexpr std::uint32_t kSize = Packet::kWidth * Packet::kHeight;
   alignas(64) std::array<int, kSize> valid;
   alignas(64) typename Packet::RayHit rays;
@@ -94,14 +109,25 @@ std::uint64_t trace_packet(RTCScene scene, const PixelRays &pixels, ImageSize si
   context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
   Packet::intersect(valid.data(), scene, &context, &rays);
   std::uint64_t hits = 0;
-  for (std::uint32_t i = 0; i < kSize; ++i)
-    hits += valid[i] && rays.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
+  for (std::uint32_t i = 0; i < kSize; ++i) {
+    if (!valid[i]) continue;
+    const bool is_hit = rays.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
+    hits += is_hit;
+    float light = -1;
+    if (is_hit) {
+      const glm::vec3 normal(rays.hit.Ng_x[i], rays.hit.Ng_y[i], rays.hit.Ng_z[i]);
+      const glm::vec3 direction(rays.ray.dir_x[i], rays.ray.dir_y[i], rays.ray.dir_z[i]);
+      light = std::abs(glm::dot(glm::normalize(normal), direction));
+    }
+    picture.set(x0 + i % Packet::kWidth, y0 + i / Packet::kWidth, light);
+  }
   return hits;
 }
 
 /// Every pixel's ray, tiles of them on all processors. Returns the hits.
 template <class Packet>
-std::uint64_t trace_packets(RTCScene scene, const Camera &camera, ImageSize size) {
+std::uint64_t trace_packets(RTCScene scene, const Camera &camera, Picture &picture) {
+  const ImageSize size = picture.size;
   const PixelRays pixels(camera, size);
   const std::uint32_t rows = (size.height + Packet::kHeight - 1) / Packet::kHeight;
   const std::uint32_t columns = (size.width + Packet::kWidth - 1) / Packet::kWidth;
@@ -111,7 +137,7 @@ std::uint64_t trace_packets(RTCScene scene, const Camera &camera, ImageSize size
       [&](const Range &range, std::uint64_t hits) {
         for (std::uint32_t row = range.rows().begin(); row < range.rows().end(); ++row) {
           for (std::uint32_t column = range.cols().begin(); column < range.cols().end(); ++column) {
-            hits += trace_packet<Packet>(scene, pixels, size, column * Packet::kWidth,
+            hits += trace_packet<Packet>(scene, pixels, picture, column * Packet::kWidth,
                                          row * Packet::kHeight);
           }
         }
@@ -172,7 +198,7 @@ class MeshTree {
 class MeshSide : public PeerSide {
  public:
   MeshSide(CompressedVolume volume, const Camera &camera, ImageSize size, RTCBuildQuality quality)
-      : camera_(camera), size_(size), quality_(quality), device_(rtcNewDevice(nullptr)) {
+      : camera_(camera), picture_{size}, quality_(quality), device_(rtcNewDevice(nullptr)) {
     // Memory that was freed stays ours: to fetch it from the system again costs as much as the work
     // itself.
     mallopt(M_MMAP_MAX, 0);
@@ -247,9 +273,9 @@ class MeshSide : public PeerSide {
     return tree;
   }
 
-  std::uint64_t trace(const MeshTree &tree, const Camera &camera) const {
-    return packets_of_16_ ? trace_packets<Packet16>(tree.scene(), camera, size_)
-                          : trace_packets<Packet8>(tree.scene(), camera, size_);
+  std::uint64_t trace(const MeshTree &tree, const Camera &camera) {
+    return packets_of_16_ ? trace_packets<Packet16>(tree.scene(), camera, picture_)
+                          : trace_packets<Packet8>(tree.scene(), camera, picture_);
   }
 
   /// Chooses the packets that are faster here, by the best of three traces of the first mesh, which
@@ -270,7 +296,7 @@ class MeshSide : public PeerSide {
   }
 
   Camera camera_;
-  ImageSize size_;
+  Picture picture_;
   RTCBuildQuality quality_;
   RTCDevice device_;
   std::vector<float> voxels_;

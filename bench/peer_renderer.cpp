@@ -70,8 +70,10 @@ class RendererSide : public PeerSide {
 
  private:
   FrameStats draw(const Camera &camera, float isovalue) {
-    return renderer_->render(
+    FrameStats stats = renderer_->render(
         {.camera = camera, .isovalue = isovalue, .size = size_, .normals = Normals::kCell});
+    renderer_->fetch({.picture = true}, {});
+    return stats;
   }
 
   CompressedVolume volume_;

@@ -49,11 +49,11 @@ class PeerSide {
  public:
   virtual ~PeerSide() = default;
   /// Draws the view at an isovalue that is not the last one's, and further frames of it. new_ms:
-  /// from the isovalue to the finished hits; warm_ms: the same view again; next_ms: then one degree
-  /// further; hit_count; and the side's own.
+  /// from the isovalue to the picture in the host's memory; warm_ms: the same view again; next_ms:
+  /// then one degree further; hit_count; and the side's own.
   virtual Measured draw(float isovalue) = 0;
   /// Draws views of an isovalue one after the other. Returns the ms of each: of the first one from
-  /// the isovalue, with nothing decoded, to the finished hits.
+  /// the isovalue, with nothing decoded, to the picture.
   virtual std::vector<double> draw_views(float isovalue, const std::vector<Camera> &cameras) = 0;
 };
 
