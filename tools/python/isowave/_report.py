@@ -10,7 +10,7 @@ from typing import Any
 
 from isowave import _core, _loader
 
-PACKAGES = ("numpy", "pocl-binary-distribution", "pillow", "websockets", "anywidget")
+PACKAGES = ("numpy", "pocl-binary-distribution", "pillow", "simplejpeg", "websockets", "anywidget")
 VARIABLES = ("ISOWAVE_DEVICE", "OCL_ICD_VENDORS", "OCL_ICD_FILENAMES", "POCL_CACHE_DIR")
 
 

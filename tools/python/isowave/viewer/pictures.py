@@ -6,15 +6,13 @@ import io
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image as pillow
 
 from isowave._request import Request
-
-JPEG_QUALITY: Final = 70
 
 
 def count_rays(size: tuple[int, int], samples: int) -> int:
@@ -117,13 +115,6 @@ class _Stream(io.BytesIO):
         if not self._is_wanted():
             raise Stopped
         return super().write(data)
-
-
-def encode_jpeg(rgb: NDArray[np.uint8]) -> bytes:
-    """A picture on the way. rgb: uint8 [h, w, 3]."""
-    stream = io.BytesIO()
-    pillow.fromarray(rgb).save(stream, "jpeg", quality=JPEG_QUALITY)
-    return stream.getvalue()
 
 
 def encode_png(rgb: NDArray[np.uint8], is_wanted: Callable[[], bool]) -> bytes:

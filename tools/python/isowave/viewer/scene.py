@@ -27,7 +27,8 @@ from numpy.typing import NDArray
 
 from . import messages
 from .interfaces import ImageLike, ProgressLike, RendererLike, VolumeLike
-from .pictures import Extent, Stopped, dividing_value, encode_jpeg, encode_png, share_within
+from .jpeg import encode_jpeg
+from .pictures import Extent, Stopped, dividing_value, encode_png, share_within
 from .protocol import MAX_FLOAT32, MAX_RAYS, Ack, Budget, Message, Wish
 from .renderers import RendererOptions, Renderers, make_host
 from .turns import Client, Frame, Post, Stage, Turns
