@@ -385,6 +385,7 @@ void set_up(const CLI::App &command, RenderArgs &options, Drawing &drawing) {
     load_bricks(options, drawing);
   } else {
     load_alone(options, drawing);
+    if (drawing.device && !compiling) compiling.emplace(*drawing.device);  // instead of the host
   }
   together(drawing.team, [&] {
     outputs.make_folder();
