@@ -74,6 +74,19 @@ TEST_F(CliHost, DrawsTheBitsOfADevice) {
   }
 }
 
+TEST_F(CliHost, DrawsVolumesThatAreTooSmallForLevels) {
+  const std::string volume = " render generate:gyroid_5x20x21_uint8 -i 128 --size 40x30 ";
+  for (const std::string options :
+       {"--voxel-pixels 2", "--time-budget 60000", "--max-surface-error 1 --rate 8"}) {
+    const auto draw = [&](const std::string &device) {
+      const auto result = run_in(kOnlyPocl, volume + options + device + " -o " + path("a.png"));
+      EXPECT_EQ(result.status, 0) << options << device << "\n" << result.err;
+      return read_file(folder_ / "a.png");
+    };
+    EXPECT_EQ(draw(" --device host"), draw(" --device cpu")) << options;
+  }
+}
+
 /// No kernel is compiled then.
 TEST_F(CliHost, DrawsByDefaultIfThereIsNoGpu) {
   const TemporaryFolder kernels;

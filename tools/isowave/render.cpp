@@ -201,7 +201,9 @@ isowave::FrameRequest FrameOfMany::request() const {
   request.isovalue = isovalue;
   request.size = {size.width, size.height, size.samples};
   request.appearance = drawing.appearance;
-  request.voxel_pixels = options.voxel_pixels;
+  // A volume too small for coarser levels is drawn by its finest.
+  const bool has_one_level = drawing.on_host() && drawing.whole.coarser_levels.empty();
+  request.voxel_pixels = has_one_level ? 0 : options.voxel_pixels;
   request.voxel_error = options.frame.voxel_error;
   request.normals = static_cast<isowave::Normals>(normals_from_string(options.normals));
   request.ambient_rays = options.ambient_rays;
