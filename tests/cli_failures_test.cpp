@@ -80,8 +80,8 @@ class CliFailures : public testing::TestWithParam<Command> {
     std::string environment = fmt::format("OCL_ICD_VENDORS=pocl.icd ISOWAVE_DEVICE=cpu {}={}",
                                           failing.loaded_by, failing.library);
     for (const std::string &setting : settings) environment += " " + (failing.prefix + setting);
-    return test::run_command("timeout -k 1 120 env " + environment + " " + test::isowave_program() +
-                             " " + arguments);
+    return test::run_command("timeout -k 1 120 env " + environment + " " +
+                             test::quoted(test::program_path()) + " " + arguments);
   }
 
   /// How many calls or requests there are without a failure.

@@ -36,7 +36,7 @@ configure "$source" "$work/build" -DISOWAVE_OPENCL=OFF -DISOWAVE_TBB=OFF
 quietly cmake --build "$work/build"
 has_none "$work/build/libisowave.a"
 quietly cmake --install "$work/build" --prefix "$work/prefix"
-for header in bricks device extract isowave quick_renderer; do
+for header in bricks device extract isowave make_renderer quick_renderer; do
   [ ! -e "$work/prefix/include/isowave/$header.hpp" ] ||
     fail "$header.hpp, which needs a device, is installed"
 done

@@ -58,12 +58,48 @@ class PickDeviceTest : public testing::Test {
   };
 };
 
-TEST_F(PickDeviceTest, DefaultIsGpuThenCpuThenFirst) {
+TEST_F(PickDeviceTest, DefaultIsGpuThenAcceleratorThenCpuThenFirst) {
   EXPECT_EQ(picked(""), 2u);
   devices_.resize(2);
+  EXPECT_EQ(picked(""), 0u);
+  devices_.front().type = ocl::DeviceType::kOther;
   EXPECT_EQ(picked(""), 1u);
   devices_.resize(1);
   EXPECT_EQ(picked(""), 0u);
+}
+
+TEST_F(PickDeviceTest, TheHostIsNoDevice) {
+  EXPECT_THAT(message_of<Error>([&] { picked("Host"); }), HasSubstr("'host' is no OpenCL device"));
+  EXPECT_THAT(message_of<Error>([&] { picked("", "host"); }), HasSubstr("(from ISOWAVE_DEVICE)"));
+  EXPECT_EQ(picked("cpu", "host"), 1u);
+}
+
+TEST_F(PickDeviceTest, TheHostDrawsIfItIsNamedOrNoFastDeviceIsThere) {
+  using ocl::DrawsOn;
+  bool listed = false;
+  const auto on = [&](std::string_view selector, std::string_view environment = "") {
+    listed = false;
+    return ocl::pick_drawing(
+        [&] {
+          listed = true;
+          return devices_;
+        },
+        selector, environment);
+  };
+  EXPECT_EQ(on("host"), DrawsOn::kHost);
+  EXPECT_EQ(on("HOST", "gpu"), DrawsOn::kHost);
+  EXPECT_EQ(on("", "host"), DrawsOn::kHost);
+  EXPECT_EQ(on("cpu", "host"), DrawsOn::kDevice);
+  EXPECT_EQ(on("", "cpu"), DrawsOn::kDevice);
+  EXPECT_FALSE(listed) << "names say enough";
+  EXPECT_EQ(on(""), DrawsOn::kDevice);
+  EXPECT_TRUE(listed);
+  devices_.resize(2);
+  EXPECT_EQ(on(""), DrawsOn::kDevice) << "an accelerator";
+  devices_.erase(devices_.begin());
+  EXPECT_EQ(on(""), DrawsOn::kHostByDefault);
+  devices_.clear();
+  EXPECT_EQ(on(""), DrawsOn::kHostByDefault);
 }
 
 TEST_F(PickDeviceTest, TakesIndexTypeAndFragment) {

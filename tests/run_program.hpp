@@ -88,9 +88,10 @@ inline std::filesystem::path program_path() {
   const char *path = std::getenv("ISOWAVE_PROGRAM");
   return path ? path : ISOWAVE_PROGRAM;
 }
-/// For the shell.
+/// For the shell. Unless the environment names a device, an OpenCL device for the CPU draws, not
+/// the host: most cases look at what devices do.
 inline std::string isowave_program() {
-  return quoted(program_path());
+  return "/usr/bin/env ISOWAVE_DEVICE=\"${ISOWAVE_DEVICE:-cpu}\" " + quoted(program_path());
 }
 
 /// The most memory that `isowave ARGUMENTS` had, whatever came of it [MiB].

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "core/api/frame_parts.hpp"
 #include "core/api/guarded.hpp"
 #include "core/api/host_renderer.hpp"
 #include "core/api/renderer_implementation.hpp"
@@ -12,10 +13,11 @@ namespace isowave {
 
 std::unique_ptr<core::Renderer> make_on_host(const core::CompressedVolume &volume,
                                              const HostRendererOptions &options) {
-  return add_choices(
-      std::make_unique<core::HostRenderer>(
-          volume, core::HostRendererOptions{options.memory_limit, options.num_threads}),
-      {.with_bounds = true, .with_time_budget = true}, volume, volume.rate());
+  return add_choices(std::make_unique<core::HostRenderer>(
+                         volume, core::HostRendererOptions{.memory_limit = options.memory_limit,
+                                                           .num_threads = options.num_threads,
+                                                           .largest = core_size(options.largest)}),
+                     {.with_bounds = true, .with_time_budget = true}, volume, volume.rate());
 }
 
 core::Abilities abilities_on_host(const core::CompressedVolume &volume) {

@@ -30,11 +30,14 @@ std::uint64_t mebibytes(std::uint64_t bytes) {
   return (bytes + (1u << 20) - 1) >> 20;
 }
 
+std::uint64_t limit_of(std::uint64_t memory_limit) {
+  return memory_limit != 0 ? memory_limit : platform::host_memory() / 4;
+}
+
 /// The memory limit, if the volume can be drawn within it.
 std::uint64_t checked_limit(const CompressedVolume &volume, const HostRendererOptions &options) {
   const std::uint64_t needed = HostLevels::least_bytes(volume),
-                      limit = options.memory_limit != 0 ? options.memory_limit
-                                                        : platform::host_memory() / 4;
+                      limit = limit_of(options.memory_limit);
   if (needed <= limit) return limit;
   throw Error(
       "drawing on the host takes {} MiB of memory at least, for value ranges of all blocks, and {} "
@@ -59,7 +62,15 @@ HostRenderer::HostRenderer(const CompressedVolume &volume, const HostRendererOpt
     : info_(volume.info),
       abilities_(abilities_of(volume)),
       num_threads_(options.num_threads),
-      levels_(volume, checked_limit(volume, options), options.num_threads) {}
+      levels_(volume, checked_limit(volume, options), options.num_threads),
+      setup_ms_(ms_since(begin_)) {
+  check_image_size(options.largest);
+  abilities_.largest = options.largest;
+}
+
+bool HostRenderer::fits(const CompressedVolume &volume, std::uint64_t memory_limit) {
+  return HostLevels::least_bytes(volume) <= limit_of(memory_limit);
+}
 
 Abilities HostRenderer::abilities_of(const CompressedVolume &volume) {
   Abilities abilities;

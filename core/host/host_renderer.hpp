@@ -6,6 +6,7 @@
 // cannot hold the isovalue, and cells whose corners are on one side. Rays decode the blocks that
 // they come to, which stay decoded for further frames.
 
+#include <chrono>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -22,6 +23,7 @@ struct HostRendererOptions {
   /// decoded anew, which is slower.
   std::uint64_t memory_limit = 0;
   std::uint32_t num_threads = 0;  ///< 0: one per processor
+  ImageSize largest{};            ///< picture of a request without a size
 };
 
 class HostRenderer : public Renderer {
@@ -33,6 +35,8 @@ class HostRenderer : public Renderer {
   explicit HostRenderer(const CompressedVolume &volume, const HostRendererOptions &options = {});
   explicit HostRenderer(CompressedVolume &&, const HostRendererOptions & = {}) = delete;
 
+  /// Whether the memory limit, or without one the host's memory, is enough for the volume.
+  static bool fits(const CompressedVolume &volume, std::uint64_t memory_limit);
   /// Abilities of a renderer of that volume.
   static Abilities abilities_of(const CompressedVolume &volume);
   Abilities abilities() const override { return abilities_; }
@@ -62,6 +66,7 @@ class HostRenderer : public Renderer {
   std::uint64_t num_decoded_blocks() const { return levels_.num_decoded(); }  ///< from the start
   /// Memory at present: value ranges and decoded blocks, without pictures.
   std::uint64_t memory_bytes() const override { return levels_.bytes(); }
+  double setup_ms() const override { return setup_ms_; }
 
  private:
   void check_has_picture() const;
@@ -73,10 +78,12 @@ class HostRenderer : public Renderer {
   template <class Draw, class After>
   bool for_bands(const OnPass &on_pass, bool more_follows, Draw draw, After after);
 
+  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();  ///< of making
   VolumeInfo info_;
   Abilities abilities_;
   std::uint32_t num_threads_;
   HostLevels levels_;
+  double setup_ms_;
   FrameParams frame_{};  ///< of the finest level, for shading
   ImageSize size_;
   std::vector<HitRecord> hits_;

@@ -55,15 +55,32 @@ struct DeviceInfo {
 std::vector<DeviceInfo> list_devices();
 
 /// Picks a device. `selector`: "" (the ISOWAVE_DEVICE environment variable if set, else the first
-/// GPU, else the first CPU, else the first device), an index, a type ("gpu", "cpu", "accelerator")
-/// or a case-insensitive fragment of the device or platform name.
+/// GPU, else the first accelerator, else the first CPU, else the first device), an index, a type
+/// ("gpu", "cpu", "accelerator") or a case-insensitive fragment of the device or platform name.
 ///
-/// Throws  Error naming the devices there are
+/// Throws  Error naming the devices there are; "host", which is no device
 DeviceInfo choose_device(std::string_view selector = "");
 /// The rule of choose_device() alone. `environment` stands for ISOWAVE_DEVICE and counts when
 /// `selector` is empty. The first of several matches is taken. Returns a reference into `devices`.
 const DeviceInfo &pick_device(std::span<const DeviceInfo> devices, std::string_view selector,
                               std::string_view environment);
+
+/// What draws if the user may choose between the host and devices.
+enum class DrawsOn {
+  kDevice,         ///< the device of choose_device()
+  kHost,           ///< the host, since the selector or ISOWAVE_DEVICE is "host"
+  kHostByDefault,  ///< the host, since neither names a device, and no GPU or accelerator is there
+};
+/// Loads no driver if the selector or ISOWAVE_DEVICE says enough.
+///
+/// selector  "host", or as for choose_device()
+DrawsOn choose_drawing(std::string_view selector = "");
+/// The rule of choose_drawing() alone.
+///
+/// list         gives the devices, if the rule needs them
+/// environment  stands for ISOWAVE_DEVICE
+DrawsOn pick_drawing(const std::function<std::vector<DeviceInfo>()> &list,
+                     std::string_view selector, std::string_view environment);
 
 /// Macro name -> value, passed as -D to a program build. No white space in either.
 using Defines = std::map<std::string, std::string>;

@@ -186,6 +186,14 @@ std::string describe(std::span<const DeviceInfo> devices) {
   return text;
 }
 
+/// The selector that stands for the host, which is no device.
+constexpr std::string_view kHost = "host";
+
+std::string_view environment_selector() {
+  const char *environment = std::getenv("ISOWAVE_DEVICE");
+  return environment != nullptr ? environment : "";
+}
+
 std::optional<DeviceType> type_named(std::string_view name) {
   for (const DeviceType type : {DeviceType::kCpu, DeviceType::kGpu, DeviceType::kAccelerator}) {
     if (name == to_string(type)) return type;
@@ -238,6 +246,12 @@ cl::Device device_handle(const DeviceInfo &info) {
 
 const DeviceInfo &pick_device(std::span<const DeviceInfo> devices, std::string_view selector,
                               std::string_view environment) {
+  const std::string_view source = selector.empty() ? " (from ISOWAVE_DEVICE)" : "";
+  const std::string wanted = lower_case(selector.empty() ? environment : selector);
+  if (wanted == kHost) {
+    throw Error("'host'{} is no OpenCL device, and this needs one: name a device, such as 'cpu'",
+                source);
+  }
   if (devices.empty() && !has_room_for_driver()) {
     throw Error(
         "out of memory: an OpenCL driver needs {} MiB of address space, and this process cannot "
@@ -250,8 +264,6 @@ const DeviceInfo &pick_device(std::span<const DeviceInfo> devices, std::string_v
         "pocl-opencl-icd; without root and from Python, pip install isowave[cpu]){}",
         cache_trouble());
   }
-  const std::string_view source = selector.empty() ? " (from ISOWAVE_DEVICE)" : "";
-  const std::string wanted = lower_case(selector.empty() ? environment : selector);
   const auto first = [&](auto &&matches) -> const DeviceInfo * {
     const auto found = std::ranges::find_if(devices, matches);
     return found == devices.end() ? nullptr : &*found;
@@ -261,8 +273,9 @@ const DeviceInfo &pick_device(std::span<const DeviceInfo> devices, std::string_v
   };
 
   if (wanted.empty()) {
-    if (const DeviceInfo *gpu = first_of_type(DeviceType::kGpu)) return *gpu;
-    if (const DeviceInfo *cpu = first_of_type(DeviceType::kCpu)) return *cpu;
+    for (const DeviceType type : {DeviceType::kGpu, DeviceType::kAccelerator, DeviceType::kCpu}) {
+      if (const DeviceInfo *found = first_of_type(type)) return *found;
+    }
     return devices.front();
   }
   const DeviceInfo *match = nullptr;
@@ -284,9 +297,23 @@ const DeviceInfo &pick_device(std::span<const DeviceInfo> devices, std::string_v
 }
 
 DeviceInfo choose_device(std::string_view selector) {
-  const char *environment = std::getenv("ISOWAVE_DEVICE");
   const std::vector<DeviceInfo> devices = list_devices();
-  return pick_device(devices, selector, environment ? environment : "");
+  return pick_device(devices, selector, environment_selector());
+}
+
+DrawsOn pick_drawing(const std::function<std::vector<DeviceInfo>()> &list,
+                     std::string_view selector, std::string_view environment) {
+  const std::string wanted = lower_case(selector.empty() ? environment : selector);
+  if (wanted == kHost) return DrawsOn::kHost;
+  if (!wanted.empty()) return DrawsOn::kDevice;
+  const bool has_fast_device = std::ranges::any_of(list(), [](const DeviceInfo &info) {
+    return info.type == DeviceType::kGpu || info.type == DeviceType::kAccelerator;
+  });
+  return has_fast_device ? DrawsOn::kDevice : DrawsOn::kHostByDefault;
+}
+
+DrawsOn choose_drawing(std::string_view selector) {
+  return pick_drawing(list_devices, selector, environment_selector());
 }
 
 }  // namespace isowave::core::ocl

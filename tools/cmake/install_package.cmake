@@ -8,7 +8,7 @@ install(TARGETS isowave_library EXPORT isowaveTargets
         LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library)
 set(left_out "")
 if(NOT ISOWAVE_OPENCL)
-  set(left_out REGEX "/(bricks|device|extract|isowave|quick_renderer)[.]hpp$" EXCLUDE)
+  set(left_out REGEX "/(bricks|device|extract|isowave|make_renderer|quick_renderer)[.]hpp$" EXCLUDE)
 endif()
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/core/api/isowave
         DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT library

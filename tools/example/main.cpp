@@ -4,9 +4,8 @@
 int main(int argc, char **argv) try {
   if (argc != 4) throw isowave::Error("usage: example VOLUME ISOVALUE PICTURE.png");
   const float isovalue = std::stof(argv[2]);
-  const auto device = isowave::open_device();
   const auto volume = isowave::open_volume(argv[1]);
-  isowave::Renderer renderer(device, volume);
+  isowave::Renderer renderer = isowave::make_renderer(volume);
   const isowave::Frame frame =
       renderer.render({.camera = renderer.camera(isovalue), .isovalue = isovalue});
   isowave::save_png(frame, argv[3]);

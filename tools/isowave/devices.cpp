@@ -1,4 +1,4 @@
-// `isowave devices`: which OpenCL devices there are and what they can do.
+// `isowave devices`: what draws: OpenCL devices and what they can do, and the host.
 
 #include <fmt/format.h>
 
@@ -13,7 +13,9 @@
 #include <vector>
 
 #include "core/base/error.hpp"
+#include "core/base/parallel_for.hpp"
 #include "core/ocl/device.hpp"
+#include "core/platform/memory.hpp"
 #include "tools/isowave/commands.hpp"
 #include "tools/isowave/render_stats.hpp"
 
@@ -62,12 +64,27 @@ Row table_row(const ocl::DeviceInfo &info, bool is_default) {
           features(can)};
 }
 
+Row host_row(bool is_default) {
+  return {is_default ? "* -" : "  -",
+          "host",
+          "isowave itself",
+          "-",
+          "-",
+          std::to_string(thread_count(0)),
+          mebibytes(platform::host_memory()),
+          "-",
+          "-",
+          "-",
+          "-"};
+}
+
 void print_table(const std::vector<ocl::DeviceInfo> &devices,
-                 std::optional<std::uint32_t> default_index) {
+                 std::optional<std::uint32_t> default_index, bool draws_on_host) {
   std::vector<Row> rows = {{"  #", "type", "name", "platform", "version", "units", "memory",
                             "largest buffer", "local", "group", "features"}};
   for (const ocl::DeviceInfo &info : devices)
     rows.push_back(table_row(info, info.index == default_index));
+  rows.push_back(host_row(draws_on_host));
   std::array<std::size_t, kNumColumns> widths{};
   for (const Row &row : rows) {
     for (std::size_t i = 0; i < kNumColumns; ++i) widths[i] = std::max(widths[i], row[i].size());
@@ -93,28 +110,32 @@ void print_json(const std::vector<ocl::DeviceInfo> &devices,
 
 void run_devices(bool as_json) {
   const std::vector<ocl::DeviceInfo> devices = ocl::list_devices();
+  const bool draws_on_host = ocl::choose_drawing() != ocl::DrawsOn::kDevice;
   std::optional<std::uint32_t> default_index;
   try {
-    default_index = ocl::choose_device().index;
+    if (!draws_on_host) default_index = ocl::choose_device().index;
   } catch (const Error &error) {
     if (devices.empty()) throw;
     // A wrong ISOWAVE_DEVICE must not hide the list that helps to correct it.
     fmt::print(stderr, "isowave: {}\n", error.what());
   }
-  if (as_json) {
+  if (!as_json) {
+    print_table(devices, default_index, draws_on_host);
+  } else if (!devices.empty()) {
     print_json(devices, default_index);
-  } else {
-    print_table(devices, default_index);
   }
+  if (devices.empty()) ocl::pick_device(devices, "", "");  // throws: says what to install
 }
 
 }  // namespace
 
 void add_devices(CLI::App &app) {
   CLI::App *command =
-      app.add_subcommand("devices", "List the OpenCL devices; * marks the one taken by default");
+      app.add_subcommand("devices",
+                         "List what draws: OpenCL devices, and the host, which needs no "
+                         "OpenCL; * marks what `render` draws on by default");
   const auto as_json = std::make_shared<bool>(false);
-  command->add_flag("--json", *as_json, "Print a JSON array instead of a table");
+  command->add_flag("--json", *as_json, "Print a JSON array of the devices instead of a table");
   command->callback([as_json] { run_devices(*as_json); });
 }
 

@@ -74,7 +74,7 @@ std::string page_of(const CLI::App &app) {
   for (const auto &[status, meaning] : kExitStatuses)
     page += fmt::format(".TP\n\\fB{}\\fR\n{}\n", status, escaped(meaning));
   page += ".SH ENVIRONMENT\n.TP\n\\fBISOWAVE_DEVICE\\fR\n";
-  page += "The device that is taken where \\-\\-device does not say another.\n";
+  page += "The device, or host, that is taken if \\-\\-device does not say another.\n";
   page += ".SH EXAMPLES\n.nf\nisowave render head.nrrd \\-i 500\n";
   page += "isowave convert head.nrrd \\-\\-tolerance 0.5 \\-o head.zfp\n";
   page += "isowave render head.zfp \\-i 500 \\-\\-orbit 36 \\-o turn.png\n.fi\n";

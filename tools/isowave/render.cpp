@@ -1,7 +1,7 @@
-// isowave render: pictures, depth and statistics of isosurfaces, on an OpenCL device, on the
-// devices of several processes, or by the scalar twin. The library's isowave::Renderer draws them;
-// this file makes the renderer that a command line asks for, and reports more than users of the
-// library see.
+// isowave render: pictures, depth and statistics of isosurfaces, on an OpenCL device, on the host,
+// on the devices of several processes, or by the scalar twin. The library's isowave::Renderer draws
+// them; this file makes the renderer that a command line asks for, and reports more than users of
+// the library see.
 
 #include <fmt/format.h>
 
@@ -18,9 +18,11 @@
 #include "core/api/renderer_implementation.hpp"
 #include "core/base/error.hpp"
 #include "core/base/ms_since.hpp"
+#include "core/base/parallel_for.hpp"
 #include "core/bricks/brick_volume.hpp"
 #include "core/bricks/ranks.hpp"
 #include "core/bricks/team_renderer.hpp"
+#include "core/host/host_renderer.hpp"
 #include "core/io/file_name.hpp"
 #include "core/io/npy.hpp"
 #include "core/io/png.hpp"
@@ -50,14 +52,16 @@ struct Drawing {
   Views views{};
   std::vector<Camera> cameras{};
   isowave::Appearance appearance{};
-  std::unique_ptr<ocl::Device> device{};  ///< none with --reference
+  std::unique_ptr<ocl::Device> device{};  ///< none with --reference, and on the host
   std::optional<TeamVolume> bricks{};     ///< of several processes
   CompressedVolume whole{};               ///< of one process
   std::unique_ptr<isowave::Renderer::Implementation> renderer{};
-  TeamRenderer *of_team = nullptr;            ///< in the renderer, if several processes draw
-  const DeviceRenderer *on_device = nullptr;  ///< this process's, unless --reference draws
+  TeamRenderer *of_team = nullptr;                ///< in the renderer, if several processes draw
+  const DeviceRenderer *on_device = nullptr;      ///< this process's, if a device draws
+  ocl::DrawsOn draws_on = ocl::DrawsOn::kDevice;  ///< not with --reference
 
   bool is_team() const { return team.size() > 1; }
+  bool on_host() const { return draws_on != ocl::DrawsOn::kDevice; }
   const CompressedVolume &volume() const { return bricks ? bricks->brick : whole; }
   const VolumeInfo &info() const { return bricks ? bricks->whole() : whole.info; }
 };
@@ -81,6 +85,26 @@ void set_wanted(RenderArgs &options) {
   if (!wanted.with_shading) options.normals = to_string(Normals::kCell);  // no picture shows them
 }
 
+/// Chooses between the host and devices.
+void choose_drawing(const CLI::App &command, const RenderArgs &options, Drawing &drawing) {
+  if (options.reference || drawing.is_team()) return;
+  drawing.draws_on = ocl::choose_drawing(options.device);
+  const std::string option = find_device_option(command);
+  if (option.empty() || !drawing.on_host()) return;
+  if (drawing.draws_on == ocl::DrawsOn::kHost)
+    throw Error("{}: the host has no such option: leave it out, or name a device", option);
+  if (ocl::list_devices().empty())
+    throw Error("{}: it needs an OpenCL device, and there is none: leave it out", option);
+  drawing.draws_on = ocl::DrawsOn::kDevice;
+}
+
+/// Whether a device must draw instead of the host, whose memory is not enough for the volume.
+bool exceeds_host(const RenderArgs &options, const Drawing &drawing) {
+  return drawing.draws_on == ocl::DrawsOn::kHostByDefault &&
+         !HostRenderer::fits(drawing.whole, options.renderer_flags.values.memory_budget) &&
+         !ocl::list_devices().empty();
+}
+
 void load_alone(RenderArgs &options, Drawing &drawing) {
   if (options.voxel_pixels > 0 || chooses_levels(options)) want_levels(options.frame.compression);
   Scene scene =
@@ -90,6 +114,13 @@ void load_alone(RenderArgs &options, Drawing &drawing) {
       chooses_levels(options) && !scene.volume.coarser_levels.empty();
   drawing.whole = std::move(scene.volume);
   drawing.cameras = std::move(scene.cameras);
+  if (exceeds_host(options, drawing)) {
+    drawing.draws_on = ocl::DrawsOn::kDevice;
+    drawing.device = open_device(options, false);
+  } else if (drawing.on_host()) {
+    fmt::print("host: {} threads; choose a device with --device or ISOWAVE_DEVICE\n",
+               thread_count(0));
+  }
 }
 
 void load_bricks(const RenderArgs &options, Drawing &drawing) {
@@ -114,6 +145,11 @@ std::unique_ptr<Renderer> make_core_renderer(RenderArgs &options, Drawing &drawi
   options.renderer = to_renderer_options(options.renderer_flags, size);
   if (options.reference)
     return std::make_unique<TwinRenderer>(drawing.whole, size, options.renderer.solver);
+  if (drawing.on_host()) {
+    return std::make_unique<HostRenderer>(
+        drawing.whole,
+        HostRendererOptions{.memory_limit = options.renderer.memory_budget, .largest = size});
+  }
   if (!drawing.is_team()) {
     auto renderer =
         std::make_unique<DeviceRenderer>(*drawing.device, drawing.whole, options.renderer);
@@ -165,7 +201,9 @@ isowave::FrameRequest FrameOfMany::request() const {
   request.isovalue = isovalue;
   request.size = {size.width, size.height, size.samples};
   request.appearance = drawing.appearance;
-  request.voxel_pixels = options.voxel_pixels;
+  // A volume too small for coarser levels is drawn by its finest.
+  const bool has_one_level = drawing.on_host() && drawing.whole.coarser_levels.empty();
+  request.voxel_pixels = has_one_level ? 0 : options.voxel_pixels;
   request.voxel_error = options.frame.voxel_error;
   request.normals = static_cast<isowave::Normals>(normals_from_string(options.normals));
   request.ambient_rays = options.ambient_rays;
@@ -232,7 +270,8 @@ ordered_json draw_frame(const FrameOfMany &frame, ordered_json &own) {
   frame.write_outputs(drawn);
   const std::uint64_t num_hits = drawn.statistics.hits;
   const LastFrame &last = drawing.renderer->last();
-  own = frame_json(frame.isovalue, frame.view, drawing.cameras[frame.view], last.stats);
+  own = frame_json(frame.isovalue, frame.view, drawing.cameras[frame.view], last.stats,
+                   drawing.on_host());
   ordered_json entry = own;
   if (drawing.is_team()) {
     const double ms = ms_since(begin) - last.certificate.total_ms;
@@ -244,8 +283,9 @@ ordered_json draw_frame(const FrameOfMany &frame, ordered_json &own) {
              {"written_ms", ms},
              {"composition_ms", drawing.of_team->composition().ms - composed_before}};
   } else {
-    fmt::print("isovalue {}, view {}: {} rays hit, {} passes, {:.1f} ms\n", frame.isovalue,
-               frame.view, with_commas(num_hits), last.stats.passes.size(),
+    fmt::print("isovalue {}, view {}: {} rays hit, {}{:.1f} ms\n", frame.isovalue, frame.view,
+               with_commas(num_hits),
+               drawing.on_host() ? "" : fmt::format("{} passes, ", last.stats.passes.size()),
                drawn.statistics.total_ms);
     entry["total_ms"] = drawn.statistics.total_ms;
   }
@@ -262,7 +302,13 @@ ordered_json document_of_one(const RenderArgs &options, const Drawing &drawing,
   ordered_json document = {{"program", program_name()},
                            {"volume", volume_json(options, drawing.whole)}};
   if (drawing.device) document["device"] = device_json(drawing.device->info());
-  document["options"] = options_json(options, drawing.views.size, drawing.cameras.size());
+  if (drawing.on_host()) {
+    document["host"] = {{"threads", thread_count(0)},
+                        {"setup_ms", drawing.renderer->setup_ms()},
+                        {"memory", drawing.renderer->memory_bytes()}};
+  }
+  document["options"] =
+      options_json(options, drawing.views.size, drawing.cameras.size(), drawing.on_host());
   if (!drawing.device) {
     document["frames"] = frames;
     return document;
@@ -313,7 +359,7 @@ ordered_json document_of_team(const RenderArgs &options, const Drawing &drawing,
             {"spacing", {whole.spacing.x, whole.spacing.y, whole.spacing.z}},
             {"type", to_string(whole.type)},
             {"blocks", num_blocks({glm::ivec3(0), blocks_along(whole)})}}},
-          {"options", options_json(options, drawing.views.size, drawing.cameras.size())},
+          {"options", options_json(options, drawing.views.size, drawing.cameras.size(), false)},
           {"frames", frames},
           {"ranks", ranks}};
 }
@@ -325,12 +371,14 @@ void print_picture_name(const RenderArgs &options, std::size_t num_views) {
                  : fmt::format("{}_isoV_viewK.png", volume_stem(options.input)));
 }
 
-/// Opens the device, loads the volume and makes the renderer.
-void set_up(RenderArgs &options, Drawing &drawing) {
+/// Opens the device, if one draws, loads the volume and makes the renderer.
+void set_up(const CLI::App &command, RenderArgs &options, Drawing &drawing) {
   Outputs outputs;
   together(drawing.team, [&] {
     if (drawing.team.rank() == 0) outputs = check_outputs(options, drawing.views.count);
-    if (!options.reference) drawing.device = open_device(options, drawing.is_team());
+    choose_drawing(command, options, drawing);
+    if (!options.reference && !drawing.on_host())
+      drawing.device = open_device(options, drawing.is_team());
   });
   // Compressing the volume compiles kernels, too.
   std::optional<CompileReport> compiling;
@@ -339,6 +387,7 @@ void set_up(RenderArgs &options, Drawing &drawing) {
     load_bricks(options, drawing);
   } else {
     load_alone(options, drawing);
+    if (drawing.device && !compiling) compiling.emplace(*drawing.device);  // instead of the host
   }
   together(drawing.team, [&] {
     outputs.make_folder();
@@ -370,7 +419,7 @@ void run_render(const CLI::App &command, RenderArgs options) {
   drawing.appearance.surface = parse_color("--color", options.color);
   drawing.appearance.background = parse_color("--background", options.background);
   set_wanted(options);
-  set_up(options, drawing);
+  set_up(command, options, drawing);
   if (options.verbose && drawing.on_device != nullptr)
     print_plan(drawing.on_device->memory_plan(), drawing.volume());
   ordered_json frames = ordered_json::array(), own_frames = frames;
@@ -385,6 +434,9 @@ void run_render(const CLI::App &command, RenderArgs options) {
   if (!drawing.is_team() && drawing.device) {
     fmt::print("setup {:.0f} ms; device memory: peak {:.1f} MiB\n", drawing.renderer->setup_ms(),
                double(drawing.device->ledger().peak()) / (1 << 20));
+  } else if (drawing.on_host()) {
+    fmt::print("setup {:.0f} ms; host memory: {:.1f} MiB\n", drawing.renderer->setup_ms(),
+               double(drawing.renderer->memory_bytes()) / (1 << 20));
   }
   together(drawing.team, [&] {
     if (drawing.team.rank() == 0 && !options.stats.empty()) write_json(document, options.stats);

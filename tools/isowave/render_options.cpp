@@ -113,6 +113,15 @@ void check_options(const CLI::App &command, const RenderArgs &options, const Tea
   check_choice(options);
 }
 
+std::string find_device_option(const CLI::App &command) {
+  for (const char *name :
+       {"--cache-slots", "--stream", "--verbose", "--no-stage-times", "--pipeline", "--speculation",
+        "--max-speculation", "--solver", "--grouping", "--closest", "--group-size"}) {
+    if (command.count(name) > 0) return name;
+  }
+  return {};
+}
+
 Outputs check_outputs(const RenderArgs &options, std::size_t num_views) {
   Outputs outputs;
   outputs.read_volume(options.input);
@@ -183,8 +192,10 @@ void add_render_options(CLI::App &command, RenderArgs &options) {
       ->check(CLI::Range(1u, ImageSize::kMaxSamples))
       ->capture_default_str();
   command.add_option("--device", options.device,
-                     "device: index, cpu, gpu, or a part of its name (see `isowave devices`); "
-                     "several, with commas: for the first process of a host, the second, ...");
+                     "host: this program draws, without OpenCL; or an OpenCL device: index, cpu, "
+                     "gpu, or a part of its name (see `isowave devices`); several, with commas: "
+                     "for the first process of a host, the second, ... [ISOWAVE_DEVICE, or the "
+                     "first GPU, or the host]");
   command.add_option("--bricks", options.bricks,
                      "how to cut the volume, one brick per process: XxYxZ bricks along each axis, "
                      "or active to give each brick the same number of surface blocks [bricks of "
@@ -228,8 +239,8 @@ void add_render_options(CLI::App &command, RenderArgs &options) {
   add_renderer_options(command, options.renderer_flags);
   command.add_flag(
       "--reference", options.reference,
-      "use the scalar C++ reference instead of a device; options that say how a device draws "
-      "then have no effect");
+      "use the scalar C++ reference instead of a device or the host; options that say how a device "
+      "draws then have no effect");
   command.get_option("--orbit")->description(
       "number of views around the whole volume [one view, which the surfaces fill]");
   group_render_options(command);

@@ -56,6 +56,8 @@ bool chooses_levels(const RenderArgs &options);
 
 /// Throws  Error: what can be told from the options alone
 void check_options(const CLI::App &command, const RenderArgs &options, const Team &team);
+/// The first option on the command line that only devices have; empty: there is none.
+std::string find_device_option(const CLI::App &command);
 /// Looks at all files before any work. Outputs go to folders that exist, except --progress-dir,
 /// which is made when frames are drawn. Throws Error.
 Outputs check_outputs(const RenderArgs &options, std::size_t num_views);

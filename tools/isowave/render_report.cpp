@@ -108,14 +108,14 @@ void print_plan(const MemoryPlan &plan, const CompressedVolume &volume) {
 }
 
 nlohmann::ordered_json options_json(const RenderArgs &options, ImageSize size,
-                                    std::size_t num_views) {
+                                    std::size_t num_views, bool on_host) {
   nlohmann::ordered_json json = {{"size", {size.width, size.height}},
                                  {"samples", size.samples},
                                  {"views", num_views},
                                  {"isovalues", options.frame.isovalues},
                                  {"voxel_error", options.frame.voxel_error},
                                  {"reference", options.reference}};
-  json.update(renderer_options_json(options.renderer));
+  if (!on_host) json.update(renderer_options_json(options.renderer));
   json["voxel_pixels"] = options.voxel_pixels;
   json["normals"] = options.normals;
   json["ambient"] = options.ambient_rays;

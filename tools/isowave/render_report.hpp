@@ -23,8 +23,9 @@ nlohmann::ordered_json report_error(double max_surface_error, const CompressedVo
 /// Prints the plan of the device's memory.
 void print_plan(const MemoryPlan &plan, const CompressedVolume &volume);
 
+/// on_host: without the options that only devices have.
 nlohmann::ordered_json options_json(const RenderArgs &options, ImageSize size,
-                                    std::size_t num_views);
+                                    std::size_t num_views, bool on_host);
 nlohmann::ordered_json volume_json(const RenderArgs &options, const CompressedVolume &volume);
 
 }  // namespace isowave::core::tools

@@ -64,7 +64,7 @@ ordered_json device_json(const ocl::DeviceInfo &info) {
 }
 
 ordered_json frame_json(double isovalue, std::size_t view, const Camera &camera,
-                        const FrameStats &stats) {
+                        const FrameStats &stats, bool on_host) {
   ordered_json result = {{"isovalue", isovalue},
                          {"view", view},
                          {"camera",
@@ -73,15 +73,19 @@ ordered_json frame_json(double isovalue, std::size_t view, const Camera &camera,
                            {"up", vec_json(camera.up)},
                            {"fovy_deg", camera.fovy_deg}}},
                          {"levels", {stats.first_level, stats.last_level}},
-                         {"passes", stats.passes.size()},
-                         {"hits_ms", stats.total_ms},
                          {"rays_hit", stats.rays_hit},
-                         {"normals", later_json(stats.normals)},
-                         {"ambient", later_json(stats.ambient)},
-                         {"uploaded_blocks", stats.uploaded_blocks},
-                         {"uploaded_bytes", stats.uploaded_bytes},
+                         {"hits_ms", stats.total_ms},
                          {"cancelled", stats.cancelled}};
   if (camera.parallel_height) result["camera"]["parallel_height"] = *camera.parallel_height;
+  if (on_host) {
+    result["ambient_ms"] = stats.ambient.ms;
+    return result;
+  }
+  result["passes"] = stats.passes.size();
+  result["normals"] = later_json(stats.normals);
+  result["ambient"] = later_json(stats.ambient);
+  result["uploaded_blocks"] = stats.uploaded_blocks;
+  result["uploaded_bytes"] = stats.uploaded_bytes;
   ordered_json passes = ordered_json::array();
   for (const PassStats &pass : stats.passes) passes.push_back(pass_json(pass));
   result["per_pass"] = std::move(passes);

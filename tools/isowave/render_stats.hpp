@@ -15,9 +15,9 @@ inline constexpr int kChartsSchema =
 /// A device and what it can do.
 nlohmann::ordered_json device_json(const ocl::DeviceInfo &info);
 
-/// One frame: isovalue, view, camera, totals and passes.
+/// One frame: isovalue, view, camera, totals and, unless it is the host's, passes.
 nlohmann::ordered_json frame_json(double isovalue, std::size_t view, const Camera &camera,
-                                  const FrameStats &stats);
+                                  const FrameStats &stats, bool on_host);
 
 /// Bytes of device memory: current, peak, and by buffer name.
 nlohmann::ordered_json memory_json(const ocl::MemoryLedger &ledger);

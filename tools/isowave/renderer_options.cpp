@@ -9,7 +9,8 @@ void add_renderer_options(CLI::App &app, RendererFlags &flags) {
   app.add_option(
          "--memory-budget", flags.values.memory_budget,
          "bound on the buffers that are made on the device, e.g. 600MB (1000^2) or 1GiB (1024^3); "
-         "what the driver takes for itself comes on top [3/4 of the device's memory]")
+         "what the driver takes for itself comes on top [3/4 of the device's memory]; on the host, "
+         "on value ranges and decoded blocks [1/4 of its memory]")
       ->transform(byte_count())
       ->type_name("BYTES");
   app.add_option(

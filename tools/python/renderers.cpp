@@ -278,9 +278,10 @@ class PyRenderer {
  public:
   using Owned = std::unique_ptr<isowave::Renderer, DestroyWithoutGil<isowave::Renderer>>;
 
-  /// Draws on a device; with the option "quick", on the host until kernels are compiled.
-  static std::unique_ptr<PyRenderer> on_device(const std::string &selector, const PyVolume &volume,
-                                               const nb::dict &options) {
+  /// Draws on a device or on the host, see isowave::make_renderer(). A device's renderer with the
+  /// option "quick" draws on the host until kernels are compiled.
+  static std::unique_ptr<PyRenderer> make(const std::string &selector, const PyVolume &volume,
+                                          const nb::dict &options) {
     const isowave::RendererOptions wanted = renderer_options_of(options);
     const auto get = reader_of(options);
     isowave::DeviceOptions device_options;
@@ -290,8 +291,8 @@ class PyRenderer {
     auto result = std::make_unique<PyRenderer>();
     {
       const WithoutGil no_gil;
-      result->renderer_.reset(new isowave::Renderer(isowave::make_quick_renderer(
-          isowave::open_device(selector, device_options), volume.volume, wanted)));
+      result->renderer_.reset(new isowave::Renderer(
+          isowave::make_renderer(volume.volume, wanted, selector, device_options)));
       PythonsEnd::instance().begin_making(*result->renderer_);
     }
     if (quick) return result;
@@ -436,7 +437,14 @@ void add_renderers(nb::module_ &m) {
       .def_prop_ro("spacing", [](const PyRenderer &r) { return r.renderer().grid().spacing; })
       .def_prop_ro("origin", [](const PyRenderer &r) { return r.renderer().grid().origin; })
       .def_prop_ro("direction", [](const PyRenderer &r) { return r.renderer().grid().direction; });
-  m.def("device_renderer", &PyRenderer::on_device, "device"_a, "volume"_a, "options"_a);
+  m.def(
+      "draws_on_host",
+      [](const std::string &selector) {
+        const WithoutGil no_gil;
+        return isowave::draws_on_host(selector);
+      },
+      "device"_a);
+  m.def("make_renderer", &PyRenderer::make, "device"_a, "volume"_a, "options"_a);
   m.def("host_renderer", &PyRenderer::on_host, "volume"_a, "memory_limit"_a);
   m.def("team_renderer", &PyRenderer::of_team, "processes"_a, "path"_a, "compression"_a,
         "options"_a);

@@ -54,8 +54,8 @@ class Device {
 /// Opens a device.
 ///
 /// selector  an index, a type ("gpu"), or a part of the name of device or platform in any case;
-///           "": the environment variable ISOWAVE_DEVICE, else the first GPU, else the first CPU,
-///           else the first device
+///           "": the environment variable ISOWAVE_DEVICE, else the first GPU, else the first
+///           accelerator, else the first CPU, else the first device
 /// Throws    Error: there is no such device, or it lacks what the kernels need
 std::shared_ptr<Device> open_device(std::string_view selector = {},
                                     const DeviceOptions &options = {});

@@ -1,9 +1,8 @@
 #pragma once
 // isowave: isosurfaces of volumes too large for the OpenCL device that draws them.
 //
-//   auto device = isowave::open_device();
 //   auto volume = isowave::open_volume("head.nrrd");
-//   isowave::Renderer renderer(device, volume);
+//   isowave::Renderer renderer = isowave::make_renderer(volume);
 //   isowave::Frame frame = renderer.render({.camera = renderer.camera(80), .isovalue = 80});
 //   isowave::save_png(frame, "head.png");
 //
@@ -13,5 +12,6 @@
 #include "isowave/device.hpp"
 #include "isowave/extract.hpp"
 #include "isowave/host.hpp"
+#include "isowave/make_renderer.hpp"
 #include "isowave/quick_renderer.hpp"
 #include "isowave/renderer.hpp"

@@ -31,8 +31,9 @@ struct RendererOptions {
 };
 
 /// Turns requests into pictures of one volume. The constructor makes a renderer that draws on a
-/// device. make_host_renderer(), make_quick_renderer() and make_team_renderer() make renderers
-/// whose pictures have the same bits. Several threads may share a renderer: its frames take turns.
+/// device. make_renderer(), make_host_renderer(), make_quick_renderer() and make_team_renderer()
+/// make renderers whose pictures have the same bits. Several threads may share a renderer: its
+/// frames take turns.
 class Renderer {
  public:
   /// Uploads the compressed volume to the device, unless the volume does not fit, and compiles the

@@ -82,7 +82,8 @@ class BrickRenderer(Placed[_core.Renderer]):
     comm
         A communicator of mpi4py, e.g. MPI.COMM_WORLD. The processes of a machine share its devices.
     device, size, samples, memory_budget, cache_blocks, rays
-        As Renderer's, for each process. Several devices, with commas, are taken in turn.
+        As Renderer's, for each process, which needs an OpenCL device. Several devices, with commas,
+        are taken in turn.
     levels
         Frames may use the levels of detail that are in the .zfp file.
     bounds

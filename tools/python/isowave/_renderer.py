@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import queue
 import sys
 import threading
@@ -76,33 +77,41 @@ def positions_of(volume: Voxels, positions: npt.NDArray[np.float64]) -> npt.NDAr
 
 
 class Renderer:
-    """Draws frames of one volume on one device. Threads may share it: frames take turns.
+    """Draws frames of one volume on a device or on the host, with the same bits.
+
+    Threads may share a renderer: its frames take turns.
 
     Parameters
     ----------
     volume
         The volume to draw.
     device
-        "gpu", "cpu", an index, or a part of a name; None: $ISOWAVE_DEVICE, else the first GPU.
+        "host": this process draws, without OpenCL. "gpu", "cpu", an index, or a part of a name: an
+        OpenCL device draws. None: $ISOWAVE_DEVICE, else the first GPU, else the host; an OpenCL
+        device for the CPU if cache_blocks or profiling are given, or the host's memory is not
+        enough.
     size, samples
         Largest picture (width, height), and rays per pixel along each axis: frames may have as many
-        rays, in any shape.
+        rays, in any shape. Frames of the host may have more.
     memory_budget
         Most device memory to take [bytes]; None: three quarters of it. With a budget, the renderer
-        takes all of it at once. Without, the cache begins small, and grows between frames.
+        takes all of it at once. Without, the cache begins small, and grows between frames. On the
+        host, most memory for value ranges and decoded blocks; None: a quarter of it.
     cache_blocks
-        Number of decoded blocks of 4^3 voxels that are kept, 8 and more. 0: as many as the budget
-        allows, or without a budget as many as frames need.
+        Number of decoded blocks of 4^3 voxels that a device keeps, 8 and more. 0: as many as the
+        budget allows, or without a budget as many as frames need.
     levels, bounds, time_budget, rays
         Whether frames may use levels of detail; ask for `max_error` and bounds; have a
-        `time_budget`; have `ambient` rays, and cast_rays() may be called.
+        `time_budget`; have `ambient` rays, and cast_rays() may be called. On the host they may.
     profiling
-        Measures stages, for statistics["stage_ms"]. The host then waits for each pass.
+        Measures a device's stages, for statistics["stage_ms"]. The host then waits for each pass.
     quick
         Returns at once: a thread makes the device's renderer, which may take half a minute if a
         driver compiles kernels. Until the renderer is ready, the host draws the same bits. Volumes
-        that are too large for the host wait for the device.
+        that are too large for the host wait for the device. No effect if the host draws.
     """
+
+    max_rays: float  # of a frame
 
     def __init__(
         self,
@@ -124,28 +133,32 @@ class Renderer:
         options = renderer_options(size, samples, memory_budget, cache_blocks, **can)
         options |= {"profiling": flag("profiling", profiling), "quick": flag("quick", quick)}
         name = "" if device is None else str(device)
-        self._hold(volume, _core.device_renderer(name, volume._core, options), size_of(size), can)
-        self.max_rays = self.size[0] * self.size[1] * options["samples"] ** 2
+        self._hold(volume, _core.make_renderer(name, volume._core, options), size_of(size), can)
+        if not self._on_host:
+            self.max_rays = self.size[0] * self.size[1] * options["samples"] ** 2
         if notice := self._core.device["notice"]:
             warnings.warn(notice, RuntimeWarning, stacklevel=2)
 
     def _hold(
         self, volume: Voxels, core: _core.Renderer, size: tuple[int, int], can: dict[str, bool]
     ) -> None:
-        """can: what frames may ask for, by the arguments of the constructor."""
+        """can: what a device's frames may ask for, by the arguments of the constructor."""
         self.volume, self.size = volume, size
-        self._core, self._can = core, can
+        self._core, self._on_host = core, not core.device["name"]
+        self._can = dict.fromkeys(can, True) if self._on_host else can
+        self.max_rays = math.inf
         self._iterating: int | None = None  # the thread that looks at a picture of passes()
 
     @property
     def device(self) -> dict[str, Any]:
         """As an entry of isowave.devices(), and notice: a line that names operations whose results
-        differ from the host's, or "". Pictures of such a device may differ in last bits."""
+        differ from the host's, or "". Pictures of such a device may differ in last bits. All texts
+        are "" if the host draws."""
         return self._core.device
 
     @property
     def memory_bytes(self) -> int:
-        """Device memory that the renderer holds; 0 before it is ready."""
+        """Memory of the device or the host that the renderer holds; 0 before it is ready."""
         return self._core.memory_bytes
 
     @property
@@ -270,7 +283,7 @@ class Renderer:
     def cast_rays(
         self, rays: npt.ArrayLike, isovalue: float, *, normals: str = "smooth"
     ) -> dict[str, npt.NDArray[Any]]:
-        """As Volume.cast_rays(), on the device, through compressed blocks. Needs rays=True."""
+        """As Volume.cast_rays(), by this renderer. Needs rays=True."""
         self._check_turn()
         if not self._can["rays"]:
             raise _core.Error("cast_rays needs a renderer that was made with rays=True")
@@ -295,7 +308,7 @@ class Renderer:
     def __repr__(self) -> str:
         width, height = self.size
         state = "" if self.ready else ", not ready"
-        return f"<isowave.Renderer {width} x {height}, {self.device['name']}{state}>"
+        return f"<isowave.Renderer {width} x {height}, {self.device['name'] or 'host'}{state}>"
 
     def passes(self, isovalue: float, **more: Any) -> Iterator[Image]:
         """Yields the picture after each pass, and the finished one last; arguments as render().

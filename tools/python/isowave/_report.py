@@ -19,7 +19,7 @@ def devices() -> list[dict[str, Any]]:
 
     Each is a dict of index, name, vendor, platform, driver, type ("gpu", "cpu", "accelerator",
     "other") and memory_bytes. `device=` of other functions takes an index, a type, or a part of a
-    name or platform.
+    name or platform; where it chooses a renderer, also "host", which draws without a device.
     """
     return _core.devices()
 
@@ -49,7 +49,9 @@ class Report:
             self.lines.append(("devices", str(error)))
         else:
             if not found:
-                self.lines.append(("devices", "none: pip install isowave[cpu] brings one"))
+                self.lines.append(
+                    ("devices", "none, the host draws: pip install isowave[cpu] brings one")
+                )
             for device in found:
                 memory = device["memory_bytes"] / 2**30
                 text = "{name} ({type}, {platform}, driver {driver}".format(**device)

@@ -117,8 +117,9 @@ class Volume(Voxels):
     ) -> Image:
         """Draws the isosurface; Renderer.render has the other arguments.
 
-        The renderer is kept for the next call. A driver may compile its kernels for half a minute
-        the first time on a machine. The host draws meanwhile, with the same bits.
+        The renderer is kept for the next call. If there is no GPU, the host draws. A GPU's driver
+        may compile its kernels for half a minute the first time on a machine. The host draws
+        meanwhile, with the same bits.
 
         Parameters
         ----------
@@ -128,10 +129,8 @@ class Volume(Voxels):
             Width and height of the picture [pixels].
         camera
             None: the surface fills the picture.
-        device
-            "gpu", "cpu", an index, or a part of a name; None: $ISOWAVE_DEVICE, else the first GPU.
-        memory_budget
-            Most device memory to take [bytes]; None: three quarters of it.
+        device, memory_budget
+            As Renderer's.
         """
         request = Request(isovalue, camera, size, **more)
         return self.draw(request, device=device, memory_budget=memory_budget)
@@ -162,7 +161,7 @@ class Volume(Voxels):
             and size[0] * size[1] * samples**2 <= self._renderer.max_rays
             and made.get("device") == wanted.get("device")
             and made.get("memory_budget") == wanted.get("memory_budget", made.get("memory_budget"))
-            and all(made.get(name) or not wanted.get(name) for name in CAPABILITIES)
+            and all(self._renderer._can[name] or not wanted.get(name) for name in CAPABILITIES)
         )
         if self._renderer is None or not fits:
             self._renderer = None  # its memory goes before that of the next is taken
@@ -172,11 +171,18 @@ class Volume(Voxels):
             more = {name: bool(wanted.get(name) or made.get(name)) for name in CAPABILITIES}
             self._made_with = {**wanted, **more}
             try:
-                self._renderer = Renderer(self, size=largest, quick=True, **self._made_with)
+                self._renderer = self._make_renderer(largest, self._made_with)
             except _core.Error:  # what other calls asked for may be too much for the memory
                 self._made_with = wanted
-                self._renderer = Renderer(self, size=largest, quick=True, **wanted)
+                self._renderer = self._make_renderer(largest, wanted)
         return self._renderer
+
+    def _make_renderer(self, largest: tuple[int, int], options: dict[str, Any]) -> Renderer:
+        device = "" if options.get("device") is None else str(options["device"])
+        if options.get("memory_budget") is None and _core.draws_on_host(device):
+            if self._fits_host():
+                return self._host_renderer()  # which cast_rays() uses, too
+        return Renderer(self, size=largest, quick=True, **options)
 
     def _host_renderer(self) -> Renderer:
         if self._host is None:
@@ -203,10 +209,11 @@ class Volume(Voxels):
             "smooth": central differences; "cell": gradients of the trilinear field itself.
         device
             "gpu", "cpu", an index, or a part of a name: the device that casts the rays, through
-            compressed blocks. None: the host. Its first call reads the whole volume for value
-            ranges, 0.17 bytes a voxel. The ranges and the blocks that rays come to stay in memory
-            as long as the volume lives, at most a quarter of the host's memory. If the ranges alone
-            take more, the default device casts the rays. The result is the same.
+            compressed blocks. None, "host": the host. Its first call reads the whole volume for
+            value ranges, 0.17 bytes a voxel. The ranges and the blocks that rays come to stay in
+            memory as long as the volume lives, at most a quarter of the host's memory. If the
+            ranges alone take more, the default device casts the rays, unless the host was named.
+            The result is the same.
 
         Returns
         -------
@@ -216,7 +223,7 @@ class Volume(Voxels):
             nothing is hit. cell: (..., 3), (z, y, x) of the voxel at the cell's lowest corner.
         """
         with self._lock:
-            if device is not None or not self._fits_host():
+            if device not in (None, "host") or not self._fits_host():
                 renderer = self._renderer_for({"device": device, "rays": True})
                 return renderer.cast_rays(rays, isovalue, normals=normals)
             renderer = self._host_renderer()
@@ -259,7 +266,8 @@ class Volume(Voxels):
             area, and programs that merge vertices by position find the mesh closed. "exact": where
             the field equals the isovalue; vertices meet on a voxel that equals it.
         device
-            "gpu", "cpu", an index, or a part of a name; None: $ISOWAVE_DEVICE, else the first GPU.
+            "gpu", "cpu", an index, or a part of a name; None: $ISOWAVE_DEVICE, else the first GPU,
+            else an OpenCL device for the CPU.
         memory_budget
             Most device memory to take [bytes]; None: three quarters of it.
         progress
@@ -292,6 +300,12 @@ class Volume(Voxels):
 
         `isowave verify` of a build with oracles judges hits by exact root finding and by Embree.
 
+        Parameters
+        ----------
+        device
+            "gpu", "cpu", an index, or a part of a name; None: $ISOWAVE_DEVICE, else the first GPU,
+            else an OpenCL device for the CPU.
+
         Returns
         -------
         dict
@@ -299,6 +313,12 @@ class Volume(Voxels):
             differing_normals: how many differ; hits: how many rays hit the surface.
         """
         request = Request(isovalue, camera, size)
+        if device is None and _core.draws_on_host(""):
+            device = "cpu"
+        if str(device).lower() == "host":
+            raise _core.Error(
+                "verify compares a device with the host: name a device, such as 'cpu'"
+            )
         with self._lock:
             renderer = self._renderer_for({"device": device, "size": request.size})
             renderer.wait()

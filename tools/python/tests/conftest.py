@@ -12,6 +12,9 @@ import isowave
 TOP = pathlib.Path(__file__).resolve().parents[3]
 FUEL = TOP / "tests/data/fuel_64x33x32_uint8.raw.gz"
 
+# Most tests look at what devices do. Without a name, the host would draw if there is no GPU.
+os.environ.setdefault("ISOWAVE_DEVICE", "cpu")
+
 
 @pytest.fixture(scope="session")
 def program():

@@ -482,9 +482,9 @@ def test_what_a_device_computes_differently_is_a_warning(volume, renderer, monke
     assert renderer.device["notice"] == ""
 
     class OfAnotherDevice:
-        device = {"notice": "device 'x' computes division differently"}
+        device = {"name": "x", "notice": "device 'x' computes division differently"}
 
-    monkeypatch.setattr(isowave._core, "device_renderer", lambda *arguments: OfAnotherDevice())
+    monkeypatch.setattr(isowave._core, "make_renderer", lambda *arguments: OfAnotherDevice())
     with pytest.warns(RuntimeWarning, match="'x' computes division differently"):
         volume.renderer(size=SIZE)
 

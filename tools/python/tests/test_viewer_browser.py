@@ -542,11 +542,11 @@ def test_while_the_device_is_prepared_the_page_says_so(open_page: Callable[..., 
     with Server(fake_scene(FakeVolume(refuse=slow))) as server:
         page = open_page()
         page.goto(server.url)
-        page.get_by_text("Preparing the device").wait_for()
+        page.get_by_text("Preparing to draw").wait_for()
         keep(page, "preparing")
         may_begin.set()
         rests(page)
-        assert not page.get_by_text("Preparing the device").is_visible()
+        assert not page.get_by_text("Preparing to draw").is_visible()
 
 
 def test_a_budget_that_is_too_small_says_what_would_do(open_page: Callable[..., Any]) -> None:

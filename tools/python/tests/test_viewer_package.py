@@ -102,7 +102,7 @@ def test_the_lossless_picture_has_the_renderers_bits(
 
 
 def test_the_host_draws_the_devices_bits(volume: isowave.Volume) -> None:
-    renderers = [volume.renderer(size=(90, 70)), make_host(volume)]
+    renderers = [volume.renderer(size=(90, 70)), make_host(volume, "cpu")]
     pictures = []
     for renderer in renderers:
         assert renderer is not None
@@ -119,6 +119,36 @@ def test_the_host_draws_the_devices_bits(volume: isowave.Volume) -> None:
         assert image.complete and image.statistics["passes"] > 0
         pictures.append(image.rgb)
     np.testing.assert_array_equal(*pictures)
+
+
+def test_without_a_gpu_the_hosts_renderer_draws_all(
+    volume: isowave.Volume, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if any(device["type"] in ("gpu", "accelerator") for device in isowave.devices()):
+        pytest.skip("a GPU draws by default")
+    monkeypatch.delenv("ISOWAVE_DEVICE", raising=False)
+    assert make_host(volume, None) is None and make_host(volume, "host") is None
+    scene = Scene(volume, size=(128, 96))
+    front = Front(scene)
+    front.session.receive({**WISH, "size": [300, 200], "max_error": 1.0, "ambient": 2})
+    head = front.wait(type="picture", stage="lossless", wish=1)
+    assert head["size"] == [300, 200] and head["detail"]["reachable"]
+    front.wait(type="bounds", wish=1)
+    states = [(h["state"], h["device"]) for h in front.heads if h["type"] == "status"]
+    assert states[-1] == ("ready", "host")
+    shown = np.asarray(Image.open(io.BytesIO(front.pictures[-1])))
+    expected = volume.render(
+        8.5,
+        size=(300, 200),
+        max_error=1.0,
+        ambient=2,
+        color=(0.5, 0.25, 1),
+        background=(1, 1, 0),
+        device="cpu",
+    )
+    np.testing.assert_array_equal(shown, expected.rgb)
+    front.session.close()
+    scene.close()
 
 
 def test_all_of_a_first_picture_and_its_bounds_come(front: Front) -> None:

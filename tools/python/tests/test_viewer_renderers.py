@@ -11,7 +11,7 @@ from viewer_scenes import Clock, Eye, make_scene, run, wish_of
 
 from isowave.viewer.protocol import Ack, Budget
 from isowave.viewer.renderers import GIVE_BACK_SECONDS, MAX_CAMERA_RAYS
-from isowave.viewer.scene import Scene
+from isowave.viewer.scene import CERTAIN_SECONDS, REST_SECONDS, Scene
 
 
 def test_a_new_budget_makes_a_new_renderer_for_all() -> None:
@@ -86,7 +86,7 @@ def test_the_host_draws_while_the_device_is_prepared(works: bool) -> None:
 
     volume = FakeVolume(refuse=refuse)
     host = FakeVolume().renderer(device="host", size=(64, 48), samples=1)
-    scene = Scene(volume, isovalue=80, size=(64, 48), make_host=lambda v: host)
+    scene = Scene(volume, isovalue=80, size=(64, 48), make_host=lambda v, d: host)
     client = scene.join(post)
     assert client is not None
     scene.receive(client, wish_of(1))
@@ -102,6 +102,34 @@ def test_the_host_draws_while_the_device_is_prepared(works: bool) -> None:
         scene.receive(client, wish_of(2))
         assert came(type="error", message="no device", wish=2)
     scene.close()
+
+
+def test_on_a_machine_without_a_gpu_the_host_draws_all_of_a_wish() -> None:
+    clock, volume = Clock(), FakeVolume(on_host=True)
+    scene = make_scene(volume, clock)
+    eye = Eye(scene)
+    assert [h["state"] for h in eye.of_type("status")] == ["ready"]
+    status = eye.of_type("status")[-1]
+    assert (status["device"], status["device_memory"], status["notice"]) == ("host", None, "")
+    eye.wish(80.0, size=(1600, 1200), ambient=2, max_error=0.5, time_budget=5.0)
+    run(scene)
+    clock.now += REST_SECONDS
+    run(scene)
+    clock.now += CERTAIN_SECONDS
+    eye.ack()
+    run(scene)
+    whole = volume.frames[0]
+    assert (whole.size, whole.request.ambient) == ((1600, 1200), 2)
+    assert (whole.request.max_error, whole.request.time_budget) == (0.5, 5.0)
+    assert eye.pictures == [(1, "whole"), (1, "lossless")]
+    assert eye.of_type("picture")[0]["reduced"] is None
+    assert eye.of_type("bounds")[-1]["within_pixel"] > 0
+    clock.now += 2 * GIVE_BACK_SECONDS
+    run(scene)
+    assert len(volume.renderers) == 1, "no picture is too large for the host"
+    scene.receive(eye.client, Budget(1 << 29))
+    run(scene)
+    assert [r["memory_budget"] for r in volume.renderers] == [None, 1 << 29]
 
 
 def test_without_any_device_each_wish_says_why_until_a_budget_works() -> None:

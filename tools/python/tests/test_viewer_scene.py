@@ -394,7 +394,7 @@ def test_closing_does_not_wait_for_a_long_pass_or_compilation(what: str) -> None
         assert may_end.wait(60)
 
     volume = FakeVolume(**{what: hold})  # type: ignore[arg-type]
-    scene = Scene(volume, isovalue=80, make_host=lambda v: None)
+    scene = Scene(volume, isovalue=80, make_host=lambda v, d: None)
     Eye(scene).wish()
     assert began.wait(60)
     scene.close()  # returns although the pass or the compilation does not end before
@@ -422,7 +422,7 @@ def test_others_get_pictures_while_a_larger_renderer_is_made() -> None:
 
     volume = FakeVolume(refuse=refuse)
     host = FakeVolume().renderer(device="host", size=(64, 48), samples=1, rays=True)
-    scene = Scene(volume, isovalue=80, make_host=lambda v: host)
+    scene = Scene(volume, isovalue=80, make_host=lambda v, d: host)
     large, other = scene.join(lambda head, data: None), scene.join(post)
     assert large is not None and other is not None
     scene.receive(large, wish_of(1, ambient=8))
@@ -453,7 +453,7 @@ def test_the_device_overtakes_the_host() -> None:
 
     volume, by_host = FakeVolume(refuse=refuse), FakeVolume(20_000, before_host_pass)
     host = by_host.renderer(device="host", size=(64, 48), samples=1, rays=True)
-    scene = Scene(volume, isovalue=80, make_host=lambda v: host)
+    scene = Scene(volume, isovalue=80, make_host=lambda v, d: host)
     client = scene.join(post)
     assert client is not None
     scene.receive(client, wish_of(1, time_budget=1.0))  # within a time: without a first picture

@@ -55,6 +55,7 @@ class Drawn:
 class FakeVolume:
     """before_pass  called before each pass of each frame, in the thread that draws
     refuse       an error for a renderer with these options, or None
+    on_host      the renderers are the host's, which have no limits
     """
 
     passes: int = 3
@@ -70,6 +71,7 @@ class FakeVolume:
     bits_per_voxel: float = 2.0
     max_error: float | None = 0.5
     num_levels: int = 1
+    on_host: bool = False
 
     def isovalue_notice(self, isovalue: float) -> str:
         least, largest = self.value_range
@@ -94,8 +96,8 @@ class FakeRenderer:
         self._volume, self._options = volume, options
         self._cache: set[float] = set()
         self.device: Mapping[str, Any] = {
-            "name": options["device"] or "fake device",
-            "memory_bytes": 1 << 30,
+            "name": "" if volume.on_host else options["device"] or "fake device",
+            "memory_bytes": 0 if volume.on_host else 1 << 30,
             "notice": "",
         }
         width, height = options["size"]
@@ -110,10 +112,14 @@ class FakeRenderer:
         drawn = Drawn(request)
         width, height = self._options["size"]
         columns, rows = drawn.size
-        if columns * rows * request.samples**2 > width * height * self._options["samples"] ** 2:
-            raise RuntimeError("the renderer was not made for so many rays")
-        if request.ambient and not self._options["rays"]:
-            raise RuntimeError("the renderer was not made for ambient rays")
+        if not self._volume.on_host:
+            if (
+                columns * rows * request.samples**2
+                > width * height * self._options["samples"] ** 2
+            ):
+                raise RuntimeError("the renderer was not made for so many rays")
+            if request.ambient and not self._options["rays"]:
+                raise RuntimeError("the renderer was not made for ambient rays")
         if math.isnan(request.isovalue):
             raise RuntimeError("the isovalue is not a number")
         self._volume.frames.append(drawn)

@@ -69,8 +69,8 @@ def make_parser() -> argparse.ArgumentParser:
     add = parser.add_argument
     add("volume", help="file of any format that isowave reads, or generate:...")
     add("-i", "--isovalue", type=float, help="first isovalue [divides the histogram best]")
-    add("--device", help="index, type (gpu, cpu) or a part of the name")
-    add("--memory-budget", type=_argument(parse_bytes), help="most device memory: 600MB, 1GiB")
+    add("--device", help="host, or a device: index, gpu, cpu, a part of its name [gpu, else host]")
+    add("--memory-budget", type=_argument(parse_bytes), help="most memory to draw: 600MB, 1GiB")
     add("--size", type=_argument(parse_size), default=(1920, 1080), help="largest picture")
     add("--rate", type=int, help="bits per voxel [all that float32 holds]")
     add("--tolerance", type=float, help="largest error of a voxel")

@@ -35,15 +35,15 @@ def welcome(
 
 
 def status(volume: VolumeLike, renderers: Renderers) -> dict[str, Any]:
-    renderer = renderers.renderer
+    renderer, on_host = renderers.renderer, renderers.on_host
     state = "ready" if renderer else "failed" if renderers.failed else "starting"
     return {
         "type": "status",
         "state": state,
-        "device": str(renderer.device["name"]) if renderer else None,
+        "device": str(renderer.device["name"] or "host") if renderer else None,
         "notice": str(renderer.device["notice"]) if renderer else None,
         "memory_bytes": int(renderer.memory_bytes) if renderer else None,
-        "device_memory": int(renderer.device["memory_bytes"]) if renderer else None,
+        "device_memory": int(renderer.device["memory_bytes"]) if renderer and not on_host else None,
         "memory_budget": renderers.wanted.memory_budget,
         "nbytes": int(volume.nbytes),
     }

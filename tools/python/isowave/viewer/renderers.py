@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
+from isowave import _core
 from isowave._levels import Voxels
 from isowave._renderer import host_renderer
 
@@ -19,6 +20,9 @@ FIRST_DIVISOR: Final = 4  # of width and height, for the first picture
 HOST_SECONDS: Final = 0.5  # for a device to be ready, before the host draws meanwhile
 GIVE_BACK_SECONDS: Final = 5.0  # without need of a large renderer, until a smaller one is made
 MAX_CAMERA_RAYS: Final = 1 << 24  # of a picture: they take memory, and make passes long
+
+
+MakeHost = Callable[[VolumeLike, "str | None"], "RendererLike | None"]
 
 
 @dataclass(frozen=True)
@@ -35,12 +39,14 @@ class RendererOptions:
 
 
 class Renderers:
-    """The device's renderer, and the host's while the device's is being made.
+    """The renderer, and while a device's is being made, the host's.
+
+    The renderer is the host's if isowave.Renderer chooses that, as on a machine without a GPU.
 
     device    as in isowave.Renderer
     first     what the first renderer is made for; none is made for less
     max_rays  of a client's picture, with the ambient ones
-    make_host makes the host's renderer, or None
+    make_host makes the host's renderer for a volume and a device that is not ready, or None
     changed   the scene's lock; notified when a renderer is there, or cannot be made
     wishes    those of the clients now
     tell      hears of a change: an error, or None. The lock is held
@@ -55,7 +61,7 @@ class Renderers:
         device: str | None,
         first: RendererOptions,
         max_rays: int,
-        make_host: Callable[[VolumeLike], RendererLike | None] | None,
+        make_host: MakeHost | None,
         changed: threading.Condition,
         wishes: Callable[[], list[Wish]],
         tell: Callable[[Exception | None], None],
@@ -66,7 +72,7 @@ class Renderers:
         self._changed, self._wishes, self._tell = changed, wishes, tell
         self._do, self._clock = do, clock
         self.renderer: RendererLike | None = None
-        self.host: RendererLike | None = None  # draws until there is a renderer
+        self.host: RendererLike | None = None  # draws until there is a device's renderer
         self.failed = False
         self.failure = ""  # why there is no renderer
         self.is_making = False
@@ -89,6 +95,11 @@ class Renderers:
         """Whether the renderer is another one than is wanted, and none is being made."""
         return not (self._made == self.wanted or self.failed or self.is_making)
 
+    @property
+    def on_host(self) -> bool:
+        """Whether the renderer is the host's, which draws pictures of any size."""
+        return self.renderer is not None and not self.renderer.device["name"]
+
     def can_draw(self, stage: Stage) -> bool:
         """Whether a stage may begin. If no renderer could be made, it ends with that error."""
         if self.renderer is not None or self.failed:
@@ -110,15 +121,15 @@ class Renderers:
         )
 
     def fitted(self, wish: Wish, stage: Stage) -> Extent:
-        """A stage's picture, within what the renderer was made for.
+        """A stage's picture, within what the device's renderer was made for.
 
-        The host, which draws before there is a renderer of the device, has no limits of its own.
+        The host has no limits of its own.
         """
         made, plan = self._made, self.plan(wish)
         if stage is not Stage.WHOLE:
             width, height = (max(1, side // FIRST_DIVISOR) for side in wish.size)
             plan = Extent((width, height), 1)
-        if made is None:
+        if made is None or self.on_host:
             return plan.within(self._ray_limit, self.max_rays)
         fitted = plan.within(made.rays, self.max_rays)
         return fitted if made.ambient else replace(fitted, ambient=0)
@@ -127,6 +138,8 @@ class Renderers:
 
     def grow(self, wish: Wish, stage: Stage) -> bool:
         """Wants a renderer for more rays, or ambient ones, if the wish's picture has such."""
+        if self.on_host:
+            return False
         wanted, plan = self.wanted, self.plan(wish)
         ambient = wanted.ambient or plan.ambient > 0
         if stage is Stage.FIRST or (plan.rays <= wanted.rays and ambient == wanted.ambient):
@@ -153,7 +166,7 @@ class Renderers:
         """Notes since when the renderer is much larger than clients need. The lock is held."""
         needed, wanted = self._needed(), self.wanted
         fits = needed.rays > wanted.rays / 2 and needed.ambient >= wanted.ambient
-        if fits:
+        if fits or self.on_host:
             self._too_large_since = None
         elif self._too_large_since is None:
             self._too_large_since = self._clock()
@@ -188,14 +201,14 @@ class Renderers:
             self.is_making, wanted = True, self.wanted
             self.renderer, self._made = None, None
             self._tell(None)
-        self._do(lambda: self._make_for_device(wanted))
+        self._do(lambda: self._make_renderer(wanted))
         # Not by a renderer with quick=True: a wish with max_error or time_budget would wait for the
         # device. The host leaves both out, and the device then draws the wish with them. The host's
         # renderer is made in a thread of its own, and only if the device takes long.
         if self._make_host is not None:
             self._do(self._make_for_host)
 
-    def _make_for_device(self, wanted: RendererOptions) -> None:
+    def _make_renderer(self, wanted: RendererOptions) -> None:
         options: dict[str, Any] = {
             "device": self._device,
             "size": wanted.largest.size,
@@ -209,7 +222,7 @@ class Renderers:
         try:
             renderer = self._volume.renderer(**options)
         except Exception as error:
-            self._device_failed(wanted, error)
+            self._renderer_failed(wanted, error)
             return
         with self._changed:
             self.is_making, self.host = False, None
@@ -219,7 +232,7 @@ class Renderers:
             self._tell(None)
             self._changed.notify_all()
 
-    def _device_failed(self, wanted: RendererOptions, error: Exception) -> None:
+    def _renderer_failed(self, wanted: RendererOptions, error: Exception) -> None:
         """Goes back to what worked. If nothing did, waits for another budget."""
         with self._changed:
             self.is_making = False
@@ -245,7 +258,7 @@ class Renderers:
                 return
         try:
             assert self._make_host is not None
-            host = self._make_host(self._volume)
+            host = self._make_host(self._volume, self._device)
         except Exception:  # there is not enough memory: then nothing is drawn meanwhile
             return
         with self._changed:
@@ -254,6 +267,8 @@ class Renderers:
                 self._changed.notify_all()
 
 
-def make_host(volume: VolumeLike) -> RendererLike | None:
-    """A renderer of the host for a volume of isowave's; None for others."""
-    return host_renderer(volume) if isinstance(volume, Voxels) else None
+def make_host(volume: VolumeLike, device: str | None) -> RendererLike | None:
+    """A renderer of the host for a volume of isowave's, unless the host draws anyway."""
+    if not isinstance(volume, Voxels) or _core.draws_on_host(device or ""):
+        return None
+    return host_renderer(volume)

@@ -30,7 +30,7 @@ from .interfaces import ImageLike, ProgressLike, RendererLike, VolumeLike
 from .jpeg import encode_jpeg
 from .pictures import Extent, Stopped, dividing_value, encode_png, share_within
 from .protocol import MAX_FLOAT32, MAX_RAYS, Ack, Budget, Message, Wish
-from .renderers import RendererOptions, Renderers, make_host
+from .renderers import MakeHost, RendererOptions, Renderers, make_host
 from .turns import Client, Frame, Post, Stage, Turns
 
 PASS_SECONDS: Final = 0.06  # between pictures of passes
@@ -48,14 +48,14 @@ class Scene:
 
     isovalue       at first; None: the one that divides the histogram best
     device         as in isowave.Renderer
-    memory_budget  of device memory [bytes]; None: the library's default
+    memory_budget  as in isowave.Renderer
     size, samples  the largest picture that the renderer is made for at first; it is made anew when
                    a client wants more
     max_clients    further ones are refused
     max_rays       of a client's picture: pixels x samples^2 x (1 + ambient). A larger one is drawn
                    with fewer pixels, then fewer ambient rays, and says so. At most
                    MAX_CAMERA_RAYS come from the camera, or as many as `size` and `samples` have.
-    make_host      a renderer that draws while the first one of the device is prepared, or None
+    make_host      makes a renderer that draws while the device's is prepared, or None
     clock          seconds; tests replace it
     start          False: no thread; call step() instead, as tests do
 
@@ -74,7 +74,7 @@ class Scene:
         samples: int = 1,
         max_clients: int = 16,
         max_rays: int = MAX_RAYS,
-        make_host: Callable[[VolumeLike], RendererLike | None] = make_host,
+        make_host: MakeHost = make_host,
         clock: Callable[[], float] = time.monotonic,
         start: bool = True,
     ) -> None:
@@ -292,7 +292,7 @@ class Scene:
             ambient=extent.ambient,
             on_pass=lambda so_far: self._on_pass(frame, so_far),
         )
-        if frame.by_host:  # it draws full detail, and is not interrupted by a time
+        if frame.by_host:  # full detail until the device draws, not interrupted by a time
             request = replace(request, max_error=None, time_budget=None)
         image = renderer.draw(request)
         if frame.stopped:

@@ -5,9 +5,9 @@
 //
 //   welcome    title, shape [z,y,x], spacing, dtype, range [low, high], bits_per_voxel,
 //              max_error of voxels, isovalue
-//   status     state: starting, ready, failed; device, notice (what it computes otherwise than
-//              the host, or ""), device_memory, memory_bytes, memory_budget, nbytes of the
-//              compressed volume
+//   status     state: starting, ready, failed; device ("host": none), notice (what it computes
+//              otherwise than the host, or ""), device_memory (null on the host), memory_bytes,
+//              memory_budget, nbytes of the compressed volume
 //   histogram  counts of equally wide bins, range
 //   picture    wish, frame, stage: first, pass, whole, lossless; format, size, samples, ambient,
 //              camera, isovalue, complete, passes, decoded_blocks, percent, ms, detail;
@@ -125,12 +125,12 @@ class View {
   showStatus(head) {
     const ready = head.state === "ready";
     this.host.dataset.state = head.state;
-    if (head.state === "starting") this.note("Preparing the device …", "passing");
+    if (head.state === "starting") this.note("Preparing to draw …", "passing");
     else this.clearNote("passing");
     this.list(".device", ready ? {
       Device: head.device,
       ...(head.notice && { Arithmetic: head.notice }),
-      Memory: `${toMiB(head.memory_bytes)} of ${toMiB(head.device_memory)}`,
+      Memory: [head.memory_bytes, head.device_memory].filter(Boolean).map(toMiB).join(" of "),
       Volume: `${toMiB(head.nbytes)}, compressed`,
     } : { Device: head.state === "failed" ? "none" : "starting …" });
     const budget = this.field("budget");
