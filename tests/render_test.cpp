@@ -226,7 +226,7 @@ TEST_P(RenderOnDevice, SmallShortIntegersInSlotsOfTheirType) {
     const auto [least, greatest] = whole_numbers_of(type, BlockPrecision{.whole_numbers = true});
     std::vector<float> source = test::sample(info.dims, test::noise_field(5));
     for (float &voxel : source)
-      voxel = std::rint(std::clamp(least + voxel * (greatest - least), least, greatest));
+      voxel = std::rint(least + (0.5f + 0.5f * voxel) * (greatest - least));
     source.front() = least;
     source.back() = greatest;
     const TestVolume volume(info, source, ErrorGoal{.exact = true});
