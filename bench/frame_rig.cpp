@@ -17,7 +17,9 @@ std::uint32_t slots_of(const CompressedVolume &volume, const FrameSetup &setup) 
 
 FrameRig::FrameRig(ocl::Device &device, const CompressedVolume &volume, const FrameSetup &setup)
     : params(make_frame_params(volume.info, setup.camera, setup.size, setup.isovalue)),
-      rays(device, {.num_rays = setup.size.num_pixels(), .scanned_pairs = setup.scanned_pairs}),
+      rays(device, {.num_rays = setup.size.num_pixels(),
+                    .with_given = setup.with_given,
+                    .scanned_pairs = setup.scanned_pairs}),
       blocks(device, volume, DeviceStream(device, volume),
              BlockCache::limits_for(params.grid, slots_of(volume, setup), rays.num_rays),
              kGroupSize),

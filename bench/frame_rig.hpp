@@ -21,6 +21,7 @@ struct FrameSetup {
   std::uint32_t max_speculation = 1;
   bool scanned_pairs = false;
   std::uint32_t cache_slots = 0;  ///< 0: all blocks
+  bool with_given = false;        ///< there may be rays of RaySource::kGiven
 };
 
 class FrameRig {

@@ -7,11 +7,17 @@ namespace isowave::core::bench {
 namespace {
 constexpr std::int64_t kEdge = 256;
 constexpr std::uint32_t kSpeculation = 64;
+
+FrameSetup setup_of(std::int64_t width, bool with_given) {
+  FrameSetup setup = mixing_layer_setup(kEdge, image_of_width(width), kSpeculation);
+  setup.with_given = with_given;
+  return setup;
+}
+
 }  // namespace
 
-RaysRig::RaysRig(ocl::Device &device, std::int64_t width)
-    : FrameRig(device, mixing_layer(kEdge),
-               mixing_layer_setup(kEdge, image_of_width(width), kSpeculation)),
+RaysRig::RaysRig(ocl::Device &device, std::int64_t width, bool with_given)
+    : FrameRig(device, mixing_layer(kEdge), setup_of(width, with_given)),
       start_rays(device, rays.num_rays, kGroupSize),
       march(device, rays.num_rays, kGroupSize, kDefaultSolver),
       request_ahead(device, rays.num_rays, kGroupSize) {

@@ -12,7 +12,7 @@ namespace isowave::core::bench {
 /// cached.
 class RaysRig : public FrameRig {
  public:
-  RaysRig(ocl::Device &device, std::int64_t width);
+  RaysRig(ocl::Device &device, std::int64_t width, bool with_given = false);
 
   /// Makes the rays of the frame.
   void start_frame();

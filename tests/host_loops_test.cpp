@@ -65,8 +65,8 @@ TEST(HostLoops, AllGiveTheSameBits) {
       ++num_compared;
       float values[64];
       loops.decode({volume.compressed.words.data(), volume.compressed.block_begin(id),
-                    volume.compressed.block_bits(id), volume.compressed.precision.min_exponent,
-                    1, 0, 4, 4, 4, 0},
+                    volume.compressed.block_bits(id), volume.compressed.precision.min_exponent, 1,
+                    0, 4, 4, 4, 0},
                    values);
       ASSERT_EQ(std::memcmp(values, blocks.field().values + 64 * id, sizeof(values)), 0) << id;
       EXPECT_EQ(loops.inside(values, 10), host_loops().inside(values, 10));
