@@ -18,6 +18,8 @@
 #include <cstdlib>
 #include <tuple>
 
+#include "tests/layer_info.hpp"
+
 namespace {
 
 constexpr cl_int kError = CL_OUT_OF_RESOURCES;
@@ -71,12 +73,7 @@ void write_count() {
 }  // namespace
 
 cl_int clGetLayerInfo(cl_layer_info what, size_t size, void *value, size_t *needed) {
-  if (what != CL_LAYER_API_VERSION) return CL_INVALID_VALUE;
-  if (needed != nullptr) *needed = sizeof(cl_layer_api_version);
-  if (value == nullptr) return CL_SUCCESS;
-  if (size < sizeof(cl_layer_api_version)) return CL_INVALID_VALUE;
-  *static_cast<cl_layer_api_version *>(value) = CL_LAYER_API_VERSION_100;
-  return CL_SUCCESS;
+  return layer_info(what, size, value, needed);
 }
 
 cl_int clInitLayer(cl_uint, const cl_icd_dispatch *target, cl_uint *num_entries,

@@ -7,6 +7,8 @@
 #define CL_TARGET_OPENCL_VERSION 300  // what the table of functions is complete with
 #include <CL/cl_layer.h>
 
+#include "tests/layer_info.hpp"
+
 namespace {
 
 cl_icd_dispatch driver, layer;
@@ -22,12 +24,7 @@ cl_int CL_API_CALL get_device_info(cl_device_id device, cl_device_info what, siz
 }  // namespace
 
 cl_int clGetLayerInfo(cl_layer_info what, size_t size, void *value, size_t *needed) {
-  if (what != CL_LAYER_API_VERSION) return CL_INVALID_VALUE;
-  if (needed != nullptr) *needed = sizeof(cl_layer_api_version);
-  if (value == nullptr) return CL_SUCCESS;
-  if (size < sizeof(cl_layer_api_version)) return CL_INVALID_VALUE;
-  *static_cast<cl_layer_api_version *>(value) = CL_LAYER_API_VERSION_100;
-  return CL_SUCCESS;
+  return layer_info(what, size, value, needed);
 }
 
 cl_int clInitLayer(cl_uint, const cl_icd_dispatch *target, cl_uint *num_entries,

@@ -1,10 +1,7 @@
 #pragma once
 // Cached values as floats, of every SlotType.
 
-#include <algorithm>
-#include <cstdint>
 #include <cstring>
-#include <limits>
 #include <span>
 #include <vector>
 
@@ -13,28 +10,11 @@
 
 namespace isowave::core::test {
 
-/// Returns use(T{}), where T is the type in C++.
-template <class Use>
-auto with_slot_type(SlotType type, const Use &use) {
-  switch (type) {
-    case SlotType::kUint8:
-      return use(std::uint8_t{});
-    case SlotType::kInt8:
-      return use(std::int8_t{});
-    case SlotType::kUint16:
-      return use(std::uint16_t{});
-    case SlotType::kInt16:
-      return use(std::int16_t{});
-    default:
-      return use(float{});
-  }
-}
-
 /// The values of a buffer.
 inline std::vector<float> slot_values(const ocl::Buffer<SlotValue> &buffer,
                                       SlotType type = SlotType::kFloat32) {
   const std::vector<SlotValue> bytes = buffer.read();
-  return with_slot_type(type, [&]<class T>(T) {
+  return with_voxel_type(type, [&]<class T>(T) {
     std::vector<T> values(bytes.size() / sizeof(T));
     std::memcpy(values.data(), bytes.data(), values.size() * sizeof(T));
     return std::vector<float>(values.begin(), values.end());
@@ -50,7 +30,7 @@ inline std::vector<SlotValue> float_slots(std::span<const float> values) {
 
 /// Fills all slots with one value.
 inline void fill_slots(ocl::Buffer<SlotValue> &buffer, SlotType type, float value) {
-  with_slot_type(type, [&]<class T>(T) {
+  with_voxel_type(type, [&]<class T>(T) {
     const std::vector<T> values(buffer.size() / sizeof(T), static_cast<T>(value));
     std::vector<SlotValue> bytes(buffer.size());
     std::memcpy(bytes.data(), values.data(), bytes.size());

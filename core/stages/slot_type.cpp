@@ -1,34 +1,36 @@
 #include "core/stages/slot_type.hpp"
 
-#include <cstddef>
 #include <string>
 
 namespace isowave::core {
 
 namespace {
 
-struct SlotTypeEntry {
-  const char *in_kernels;
-  std::uint32_t bits;
-};
-
-constexpr SlotTypeEntry kSlotTypes[] = {
-    {"float", 32}, {"uchar", 8}, {"char", 8}, {"ushort", 16}, {"short", 16}};
-
-const SlotTypeEntry &entry_of(SlotType type) {
-  return kSlotTypes[static_cast<std::size_t>(type)];
+const char *name_in_kernels(SlotType type) {
+  switch (type) {
+    case SlotType::kUint8:
+      return "uchar";
+    case SlotType::kInt8:
+      return "char";
+    case SlotType::kUint16:
+      return "ushort";
+    case SlotType::kInt16:
+      return "short";
+    default:
+      return "float";
+  }
 }
 
 }  // namespace
 
 std::uint64_t slot_bytes(SlotType type) {
-  return std::uint64_t{ISO_BLOCK_VOXELS} * entry_of(type).bits / 8;
+  return std::uint64_t{ISO_BLOCK_VOXELS} * size_of(type);
 }
 
 ocl::Defines with_slots(ocl::Defines defines, SlotType type) {
   if (type == SlotType::kFloat32) return defines;  // as kernels are without macros
-  defines.emplace("ISO_SLOT_VALUE", entry_of(type).in_kernels);
-  defines.emplace("ISO_SLOT_BITS", std::to_string(entry_of(type).bits) + "u");
+  defines.emplace("ISO_SLOT_VALUE", name_in_kernels(type));
+  defines.emplace("ISO_SLOT_BITS", std::to_string(8 * size_of(type)) + "u");
   return defines;
 }
 
@@ -38,18 +40,8 @@ SlotType slot_type_for(std::span<const CompressedVolume *const> levels, bool wit
   for (const CompressedVolume *level : levels) {
     if (!level->precision.whole_numbers) return SlotType::kFloat32;
   }
-  switch (volume.info.type) {
-    case VoxelType::kUint8:
-      return SlotType::kUint8;
-    case VoxelType::kInt8:
-      return SlotType::kInt8;
-    case VoxelType::kUint16:
-      return SlotType::kUint16;
-    case VoxelType::kInt16:
-      return SlotType::kInt16;
-    default:
-      return SlotType::kFloat32;
-  }
+  const VoxelType type = volume.info.type;
+  return is_integer(type) && size_of(type) <= 2 ? type : SlotType::kFloat32;
 }
 
 SlotType slot_type_for(const CompressedVolume &volume) {

@@ -10,7 +10,8 @@
 
 namespace isowave::core {
 
-enum class SlotType : std::uint8_t { kFloat32, kUint8, kInt8, kUint16, kInt16 };
+/// float32, or an integer of 8 or 16 bits.
+using SlotType = VoxelType;
 
 /// A byte of a slot. Kernels read and write values of a SlotType (kernels_cl/device/slot_values.h).
 struct SlotValue {
