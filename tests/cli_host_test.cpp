@@ -24,7 +24,7 @@ using testing::StartsWith;
 
 const std::string kRender =
     " render " ISOWAVE_TEST_DATA "/fuel_64x33x32_uint8.raw.gz -i 10 --size 96x72 ";
-/// Machines of which the program sees this much. Tests may find a GPU where they run.
+/// What the program sees of the machine: the machine that runs the tests may have a GPU.
 const std::string kOnlyPocl = "OCL_ICD_VENDORS=pocl.icd",
                   kNoDriver = "OCL_ICD_VENDORS=/nonexistent",
                   kGpu = kOnlyPocl + " OPENCL_LAYERS=" ISOWAVE_GPU_LAYER;

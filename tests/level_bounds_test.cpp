@@ -130,6 +130,18 @@ double least_slack(const BoundsScene &scene, std::size_t level, int num_places) 
   return least;
 }
 
+TEST(PlaneError, CountsTheRoundingOfIntegersThatWereOff) {
+  const BlockPrecision exact{.min_exponent = -1, .whole_numbers = true, .max_voxel_error = 0},
+      off{.min_exponent = -1, .whole_numbers = true, .max_voxel_error = 1},
+      unknown{.min_exponent = -1, .whole_numbers = true}, floats{.min_exponent = -6};
+  EXPECT_EQ(plane_error(exact, 4), 4);
+  EXPECT_EQ(plane_error(off, 4), 5);
+  EXPECT_EQ(plane_error(unknown, 4), 5);
+  EXPECT_EQ(plane_error(floats, 4), 4);
+  EXPECT_EQ(plane_error(exact, 0.9), 0) << "no error of integers is below 1";
+  EXPECT_TRUE(with_fewer_planes(exact, 4).whole_numbers);
+}
+
 TEST(LevelBounds, HoldBetweenVoxels) {
   for (const auto &[dims, rate] :
        {std::pair(glm::uvec3(33, 32, 40), 16u), std::pair(glm::uvec3(17, 41, 20), 16u),

@@ -191,7 +191,9 @@ float largest_bound(const BlockBounds &bounds) {
 double plane_error(const BlockPrecision &bound, double voxel_error) {
   const BlockPrecision fewer = with_fewer_planes(bound, voxel_error);
   if (fewer.min_exponent == bound.min_exponent) return 0;
-  return std::ldexp(1.0, fewer.min_exponent);
+  // Both are rounded. If the values of all planes are not the source's, each may be off by a half.
+  const bool is_rounded = bound.whole_numbers && bound.max_voxel_error != 0.0;
+  return std::ldexp(1.0, fewer.min_exponent) + (is_rounded ? 1.0 : 0.0);
 }
 
 ValueOffset value_offset(const LevelError &error, FieldBound bound, double plane_error,

@@ -44,7 +44,8 @@ struct BlockPrecision {
 };
 
 /// Drops the bit planes that an error of at most voxel_error allows to leave out. 0 drops none.
-/// Blocks of reversible streams can spare none. Whole numbers stay whole: no error is below 1.
+/// Blocks of reversible streams can spare none. Whole numbers stay whole, so an error below 1 drops
+/// none of theirs.
 BlockPrecision with_fewer_planes(const BlockPrecision &bound, double voxel_error);
 
 /// The integers that decoded values are rounded to (kernels_cl/portable/whole_number.h).

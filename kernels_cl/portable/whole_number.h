@@ -8,8 +8,8 @@
 
 ISO_NAMESPACE_BEGIN
 
-/// The integer from least to greatest that is next to value; never -0. An error of value that is an
-/// integer does not grow: the true value is such an integer.
+/// The integer from least to greatest that is next to value; never -0. If the true value is such an
+/// integer, and value is off by at most an integer, the result is off by no more.
 ISO_INLINE float whole_number(float value, float least, float greatest) {
   const float whole = rint(value);
   const float held = whole < least ? least : whole > greatest ? greatest : whole;

@@ -84,7 +84,7 @@ def head_with(file: bytes, height: int, interval: int) -> bytes:
 
 
 def segments(file: bytes) -> Iterator[tuple[int, int]]:
-    """Marker and first byte of each segment before the data, the last of which is SOS."""
+    """Yields the marker and the first byte of each segment before the data; SOS is the last."""
     begin, marker = 2, 0
     while marker != SOS:
         marker = file[begin + 1]
