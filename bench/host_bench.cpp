@@ -1,8 +1,8 @@
 // host_bench: frames that are drawn without OpenCL (core/host), ray by ray and in packets of eight
 // rays, in turns in one process; and with nothing decoded before. Ends with an error where a bit of
-// a hit differs.
+// a hit differs. With --voxel-pixels: frames of levels of detail.
 //
-//   host_bench VOLUME [--isovalues 40,80,120] [--views 3] [--rounds 5]
+//   host_bench VOLUME [--isovalues 40,80,120] [--views 3] [--rounds 5] [--voxel-pixels 0,1,2,4]
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -21,6 +21,7 @@
 #include "core/base/error.hpp"
 #include "core/base/parallel_for.hpp"
 #include "core/host/host_blocks.hpp"
+#include "core/host/host_levels.hpp"
 #include "core/view/camera.hpp"
 #include "core/view/detail.hpp"
 #include "core/view/frame.hpp"
@@ -37,6 +38,7 @@ struct Options {
   std::vector<float> isovalues;
   std::uint32_t views = 3, rounds = 5, threads = 0;
   std::vector<std::uint32_t> size = {1280, 720};
+  std::vector<double> voxel_pixels;
   tools::CompressionOptions compression{.rate = 4};
 };
 
@@ -53,23 +55,34 @@ double milliseconds(const Work &work) {
       .count();
 }
 
-using Trace = decltype(HostLoops::trace);
-
-/// Draws the frame in tiles of 16 x 16 rays, on as many threads as asked for.
-void draw(const FrameParams &frame, const HostField &field, Trace trace, bool is_smooth,
-          std::uint32_t threads, std::vector<HitRecord> &hits) {
+/// Draws tiles of 16 x 16 rays, on as many threads as asked for.
+template <class DrawTile>
+void draw_tiles(const ScreenBox &screen, std::uint32_t threads, const DrawTile &draw_tile) {
   constexpr std::uint32_t kEdge = 16;
-  const ScreenBox &screen = frame.screen;
   if (screen.begin_x >= screen.end_x || screen.begin_y >= screen.end_y) return;
   const std::uint32_t columns = (screen.end_x - screen.begin_x + kEdge - 1) / kEdge,
                       rows = (screen.end_y - screen.begin_y + kEdge - 1) / kEdge;
   parallel_for(std::uint64_t{columns} * rows, threads, [&](std::uint64_t tile, std::uint32_t) {
     const auto x = static_cast<std::uint32_t>(screen.begin_x + tile % columns * kEdge),
                y = static_cast<std::uint32_t>(screen.begin_y + tile / columns * kEdge);
-    trace(frame, field,
-          {x, y, std::min(x + kEdge, screen.end_x), std::min(y + kEdge, screen.end_y)}, is_smooth,
-          hits.data());
+    draw_tile(RayTile{x, y, std::min(x + kEdge, screen.end_x), std::min(y + kEdge, screen.end_y)});
   });
+}
+
+using Trace = decltype(HostLoops::trace);
+
+void draw(const FrameParams &frame, const HostField &field, Trace trace, bool is_smooth,
+          std::uint32_t threads, std::vector<HitRecord> &hits) {
+  draw_tiles(frame.screen, threads,
+             [&](const RayTile &tile) { trace(frame, field, tile, is_smooth, hits.data()); });
+}
+
+std::uint64_t num_differing_of(const std::vector<HitRecord> &hits,
+                               const std::vector<HitRecord> &expected) {
+  std::uint64_t number = 0;
+  for (std::size_t ray = 0; ray < hits.size(); ++ray)
+    number += std::memcmp(&hits[ray], &expected[ray], sizeof(HitRecord)) != 0;
+  return number;
 }
 
 /// Isovalues at a quarter, the middle and three quarters of the volume's values.
@@ -132,10 +145,8 @@ void measure(const Options &options) {
           if (expected.empty()) expected = hits;
           if (round > 0 || way.is_smooth) continue;
           num_rays += hits.size();
-          for (std::size_t ray = 0; ray < hits.size(); ++ray) {
-            num_hits += hits[ray].block_id != ISO_INVALID_ID;
-            num_differing += std::memcmp(&hits[ray], &expected[ray], sizeof(HitRecord)) != 0;
-          }
+          for (const HitRecord &hit : hits) num_hits += hit.block_id != ISO_INVALID_ID;
+          num_differing += num_differing_of(hits, expected);
         }
       }
     }
@@ -144,6 +155,74 @@ void measure(const Options &options) {
   for (const Way &way : ways) fmt::print("  {:<28}{:8.1f}\n", way.name, median(times[way.name]));
   fmt::print("  {} rays, {} hits, {} differ from those ray by ray\n", num_rays, num_hits,
              num_differing);
+  if (num_differing != 0) throw Error("{} hits differ", num_differing);
+}
+
+/// What frames of levels of detail take, for a distance of voxels.
+struct LevelTimes {
+  std::vector<double> rays, packets, cold;  ///< ms; cold: in packets, with nothing decoded
+  std::uint64_t decoded = 0;                ///< blocks of cold frames
+  std::size_t first_level = ~std::size_t{0}, last_level = 0;
+};
+
+/// Draws each view with each distance of voxels, in turns.
+void measure_levels(const Options &options) {
+  tools::CompressionOptions compression = options.compression;
+  compression.levels = 0;
+  const CompressedVolume volume = tools::load_volume(options.volume, {}, compression);
+  const ImageSize size{options.size.at(0), options.size.at(1)};
+  HostLevels levels(volume, HostBlocks::kNoLimit, options.threads);
+  std::vector<LevelTimes> times(options.voxel_pixels.size());
+  std::uint64_t num_rays = 0, num_differing = 0;
+  for (const float isovalue : isovalues_of(options, volume)) {
+    for (const Camera &camera : orbit_cameras(volume.info, options.views)) {
+      for (std::uint32_t round = 0; round <= options.rounds; ++round) {  // the first makes levels
+        for (std::size_t i = 0; i < times.size(); ++i) {
+          LevelTimes &of = times[i];
+          const std::vector<FrameParams> frames =
+              make_level_frames(levels.infos(), camera, size, isovalue, options.voxel_pixels[i]);
+          const std::vector<HostLevel> drawing = levels.open(frames);
+          const auto draw_by = [&](auto trace, std::vector<HitRecord> &hits) {
+            return milliseconds([&] {
+              draw_tiles(drawing.front().frame.screen, options.threads,
+                         [&](const RayTile &tile) { trace(drawing, tile, false, hits.data()); });
+            });
+          };
+          std::vector<HitRecord> by_rays(size.num_rays(), no_hit()), hits = by_rays, cold = hits;
+          levels.forget();
+          const std::uint64_t before = levels.num_decoded();
+          const double cold_ms = draw_by(host_loops().trace_levels, cold);
+          const std::uint64_t decoded = levels.num_decoded() - before;
+          const double packets_ms = draw_by(host_loops().trace_levels, hits),
+                       rays_ms = draw_by(host_loops().trace_rays_of_levels, by_rays);
+          if (round == 0) {
+            num_rays += hits.size();
+            num_differing += num_differing_of(hits, by_rays) + num_differing_of(cold, by_rays);
+            of.decoded += decoded;
+            const auto first = std::ranges::find_if(frames, draws) - frames.begin();
+            of.first_level = std::min(of.first_level, static_cast<std::size_t>(first));
+            of.last_level =
+                std::max(of.last_level, static_cast<std::size_t>(first) + drawing.size() - 1);
+            continue;
+          }
+          of.cold.push_back(cold_ms);
+          of.packets.push_back(packets_ms);
+          of.rays.push_back(rays_ms);
+        }
+      }
+    }
+  }
+  fmt::print("{}: {} x {} x {}; {} threads; ms, medians\n", options.volume, volume.info.dims.x,
+             volume.info.dims.y, volume.info.dims.z, thread_count(options.threads));
+  fmt::print("  {:>12}{:>10}{:>10}{:>10}{:>10}{:>14}\n", "voxel pixels", "levels", "rays",
+             "packets", "cold", "blocks decoded");
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    const LevelTimes &of = times[i];
+    fmt::print("  {:>12}{:>10}{:>10.1f}{:>10.1f}{:>10.1f}{:>14}\n", options.voxel_pixels[i],
+               fmt::format("{}-{}", of.first_level, of.last_level), median(of.rays),
+               median(of.packets), median(of.cold), of.decoded);
+  }
+  fmt::print("  {} rays, {} differ from those ray by ray\n", num_rays, num_differing);
   if (num_differing != 0) throw Error("{} hits differ", num_differing);
 }
 
@@ -169,6 +248,16 @@ int main(int argc, char **argv) {
       ->delimiter('x')
       ->expected(2);
   app.add_option("--rate", options.compression.rate, "bits per voxel [4]");
-  app.callback([&] { bench::measure(options); });
+  app.add_option("--voxel-pixels", options.voxel_pixels,
+                 "draw levels of detail instead, with each of these largest distances between "
+                 "voxels of a coarser level [pixels]")
+      ->delimiter(',');
+  app.callback([&] {
+    if (options.voxel_pixels.empty()) {
+      bench::measure(options);
+    } else {
+      bench::measure_levels(options);
+    }
+  });
   return tools::run_program(app, argc, argv);
 }

@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <cstring>
 
@@ -92,11 +94,36 @@ TEST(HostLoops, AllGiveTheSameBitsOfLevels) {
   const std::vector<HostLevel> drawing = levels.open(frames);
   EXPECT_GT(drawing.size(), 1u);
   for (const HostLoops &loops : all_host_loops()) {
-    std::vector<HitRecord> hits(size.num_rays(), no_hit());
-    EXPECT_EQ(loops.trace_levels(drawing, {0, 0, size.width, size.height}, true, hits.data()),
-              test::num_hits(expected));
-    expect_same_hits(hits, expected, size.width);
+    for (const auto trace : {loops.trace_levels, loops.trace_rays_of_levels}) {
+      std::vector<HitRecord> hits(size.num_rays(), no_hit());
+      EXPECT_EQ(trace(drawing, {0, 0, size.width, size.height}, true, hits.data()),
+                test::num_hits(expected));
+      expect_same_hits(hits, expected, size.width);
+    }
   }
+}
+
+/// Rays that fuzz tests draw: half a million, or ISOWAVE_FUZZ_RAYS.
+std::uint64_t num_fuzz_rays() {
+  const char *asked = std::getenv("ISOWAVE_FUZZ_RAYS");
+  return asked != nullptr ? std::strtoull(asked, nullptr, 10) : 500'000;
+}
+
+/// Cameras on voxels, along planes and edges, within the volume and around it.
+std::vector<Camera> fuzz_cameras(const glm::uvec3 &dims, Random &random) {
+  std::vector<Camera> cameras = hard_cameras(dims);
+  const glm::dvec3 extent = glm::dvec3(dims) - 1.0;
+  const auto anywhere = [&](double margin) {
+    return extent * glm::dvec3(random.in(-margin, 1 + margin), random.in(-margin, 1 + margin),
+                               random.in(-margin, 1 + margin));
+  };
+  for (int i = 0; i < 8; ++i) {
+    const glm::dvec3 eye = anywhere(i < 4 ? 0 : 2);
+    cameras.push_back(test::camera_along(i % 2 == 0 ? glm::round(eye) : eye,
+                                         anywhere(0) + glm::dvec3(0.01, 0.02, 0.03) - eye,
+                                         {0.3, 1, 0.2}, random.in(2, 110)));
+  }
+  return cameras;
 }
 
 /// A tile that ends within packets of 4 x 2 rays: nothing beyond it is drawn, nothing missing.
@@ -117,14 +144,19 @@ TEST(HostLoops, TilesOfAnySize) {
     EXPECT_EQ(host_loops().trace(frame, blocks.field(), tile, false, hits.data()),
               test::num_hits(expected));
     expect_same_hits(hits, expected, 64);
+    for (const HostLoops &loops : all_host_loops()) {  // one level is a special case of several
+      const HostLevel level{frame, blocks.field()};
+      std::ranges::fill(hits, no_hit());
+      EXPECT_EQ(loops.trace_levels({&level, 1}, tile, false, hits.data()),
+                test::num_hits(expected));
+      expect_same_hits(hits, expected, 64);
+    }
   }
 }
 
-/// Packets against rays alone: odd volumes, eyes anywhere, ties. ISOWAVE_FUZZ_RAYS: so many rays,
-/// instead of half a million.
+/// Packets against rays alone: odd volumes, eyes anywhere, ties.
 TEST(HostLoops, PacketsFindWhatRaysAloneFind) {
-  const char *asked = std::getenv("ISOWAVE_FUZZ_RAYS");
-  const std::uint64_t num_rays = asked != nullptr ? std::strtoull(asked, nullptr, 10) : 500'000;
+  const std::uint64_t num_rays = num_fuzz_rays();
   const ImageSize size{41, 31};
   Random random(17);
   std::uint64_t rays = 0, num_hits = 0;
@@ -141,18 +173,7 @@ TEST(HostLoops, PacketsFindWhatRaysAloneFind) {
                                     : static_cast<float>(random.in(-0.9, 0.9));
     HostBlocks blocks(volume.compressed, HostBlocks::kNoLimit, 0);
     blocks.select(isovalue);
-    std::vector<Camera> cameras = hard_cameras(dims);
-    const glm::dvec3 extent = glm::dvec3(dims) - 1.0;
-    const auto anywhere = [&](double margin) {
-      return extent * glm::dvec3(random.in(-margin, 1 + margin), random.in(-margin, 1 + margin),
-                                 random.in(-margin, 1 + margin));
-    };
-    for (int i = 0; i < 8; ++i) {
-      const glm::dvec3 eye = anywhere(i < 4 ? 0 : 2);
-      cameras.push_back(test::camera_along(i % 2 == 0 ? glm::round(eye) : eye,
-                                           anywhere(0) + glm::dvec3(0.01, 0.02, 0.03) - eye,
-                                           {0.3, 1, 0.2}, random.in(2, 110)));
-    }
+    const std::vector<Camera> cameras = fuzz_cameras(dims, random);
     for (std::size_t view = 0; view < cameras.size(); ++view, rays += size.num_rays()) {
       FrameParams frame = make_frame_params(volume.info(), cameras[view], size, isovalue);
       frame.surface = blocks.surface();
@@ -172,6 +193,60 @@ TEST(HostLoops, PacketsFindWhatRaysAloneFind) {
   }
   RecordProperty("rays", std::to_string(rays));
   EXPECT_GT(num_hits, rays / 20);
+}
+
+/// The same in frames of several levels of detail, which agree on little in noise. Their bands have
+/// any length, some of them whole numbers of t.
+TEST(HostLoops, PacketsOfLevelsFindWhatRaysAloneFind) {
+  const std::uint64_t num_rays = num_fuzz_rays();
+  const ImageSize size{41, 31};
+  Random random(18);
+  std::uint64_t rays = 0, num_hits = 0, num_at_borders = 0;
+  for (std::uint32_t volume_number = 0; rays < num_rays; ++volume_number) {
+    const auto dim = [&] { return static_cast<std::uint32_t>(random.in(9, 70)); };
+    const glm::uvec3 dims(dim(), dim(), dim());
+    ArrayReader reader(
+        test::grid_info(dims),
+        test::sample(dims, volume_number % 2 == 0 ? test::gyroid_field(random.in(6, 60))
+                                                  : test::noise_field(volume_number)));
+    const CompressedVolume volume = compress(reader, CompressOptions{.rate = 8, .levels = 0});
+    HostLevels levels(volume, HostBlocks::kNoLimit, 0);
+    const auto isovalue = static_cast<float>(random.in(-0.6, 0.6));
+    for (const Camera &camera : fuzz_cameras(dims, random)) {
+      std::vector<FrameParams> frames =
+          make_level_frames(levels.infos(), camera, size, isovalue, std::exp2(random.in(-2, 6)));
+      const bool is_even = random.in(0, 1) < 0.3;
+      for (std::size_t level = 1; is_even && level < frames.size(); ++level) {
+        Band &behind = frames[level].band, &before = frames[level - 1].band;
+        if (behind.begin_t == 0 || !draws(frames[level])) continue;
+        // t of the coarsest level; the others' are multiples by powers of two.
+        const float last = frames.back().view.t_scale;
+        const float t = std::ceil(behind.begin_t * frames[level].view.t_scale / last);
+        before.end_t = t * (last / frames[level - 1].view.t_scale);
+        behind.begin_t = t * (last / frames[level].view.t_scale);
+      }
+      const std::vector<HostLevel> drawing = levels.open(frames);
+      if (drawing.size() == 1) continue;
+      rays += size.num_rays();
+      std::vector<HitRecord> expected(size.num_rays(), no_hit()), hits = expected;
+      const RayTile all = {0, 0, size.width, size.height};
+      num_hits += host_loops().trace_rays_of_levels(drawing, all, false, expected.data());
+      for (const HostLevel &level : drawing)
+        num_at_borders += static_cast<std::uint64_t>(std::ranges::count(
+            expected, level.frame.band.begin_t * level.frame.view.t_scale, &HitRecord::t));
+      for (const HostLoops &loops : all_host_loops()) {
+        if (loops.trace_levels == loops.trace_rays_of_levels) continue;
+        hits.assign(size.num_rays(), no_hit());
+        loops.trace_levels(drawing, all, false, hits.data());
+        expect_same_hits(hits, expected, size.width);
+      }
+      ASSERT_FALSE(HasFailure()) << fmt::format("volume {} ({}x{}x{}), isovalue {}", volume_number,
+                                                dims.x, dims.y, dims.z, isovalue);
+    }
+  }
+  RecordProperty("rays", std::to_string(rays));
+  EXPECT_GT(num_hits, rays / 20);
+  EXPECT_GT(num_at_borders, rays / 1000);
 }
 
 }  // namespace

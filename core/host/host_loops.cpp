@@ -2,6 +2,8 @@
 #define ISO_LEVELS 1
 #include "core/host/host_loops.hpp"
 
+#include <bit>
+
 #include "core/frame/solvers.hpp"
 #include "core/host/host_packets.hpp"
 #include "kernels_cl/portable/block_cells.h"
@@ -347,9 +349,13 @@ inline void smooth(const FrameParams &frame, const HostField &field, const RayTi
   }
 }
 
+inline void smooth_levels(std::span<const HostLevel> levels, const RayTile &tile, HitRecord *hits) {
+  for (const HostLevel &level : levels) smooth(level.frame, level.field, tile, hits);
+}
+
 template <auto kTraceRay, auto kSide>
-inline uint trace_levels(std::span<const HostLevel> levels, const RayTile &tile, bool is_smooth,
-                         HitRecord *hits) {
+inline uint trace_rays_of_levels(std::span<const HostLevel> levels, const RayTile &tile,
+                                 bool is_smooth, HitRecord *hits) {
   uint num_hits = 0;
   for (uint y = tile.begin_y; y < tile.end_y; ++y) {
     for (uint x = tile.begin_x; x < tile.end_x; ++x) {
@@ -357,10 +363,84 @@ inline uint trace_levels(std::span<const HostLevel> levels, const RayTile &tile,
       num_hits += trace_bands<kTraceRay, kSide>(levels, ray_id, hits + ray_id);
     }
   }
-  if (!is_smooth || num_hits == 0) return num_hits;
-  for (const HostLevel &level : levels) smooth(level.frame, level.field, tile, hits);
+  if (is_smooth && num_hits != 0) smooth_levels(levels, tile, hits);
   return num_hits;
 }
+
+#ifdef ISO_HAS_WIDE_LOOPS
+/// Eight rays of a frame: 4 columns and 2 rows from (x, y) on.
+struct RayPacket {
+  uint x, y;
+  uint lanes;      ///< bit column + 4 row: the rays that have no hit yet
+  uchar sides[8];  ///< where they were at the end of the last band
+};
+
+inline uint ray_of_packet(const FrameParams &frame, const RayPacket &packet, uint lane) {
+  return packet.x + lane % 4 + frame.view.width * (packet.y + lane / 4);
+}
+
+/// Lets rays hit at the border at which a level's band begins, if the level before has them on the
+/// other side of the surface. Returns the number of hits.
+template <auto kFindSides, auto kSide>
+inline uint hit_at_borders(const HostLevel &level, RayPacket &packet, HitRecord *hits) {
+  const LastPlanes last = last_planes(&level.frame);
+  const float t = level.frame.band.begin_t;
+  uchar sides[8];
+  uint num_hits = 0;
+  kFindSides(level, packet.x, packet.y, packet.lanes, t, sides);
+  for (uint lane = 0; lane < 8; ++lane) {
+    const uint before = packet.sides[lane];
+    if ((packet.lanes >> lane & 1u) == 0 || before == ISO_SIDE_UNKNOWN) continue;
+    if (sides[lane] == ISO_SIDE_UNKNOWN || sides[lane] == before) continue;
+    const uint ray_id = ray_of_packet(level.frame, packet, lane);
+    const Ray ray = make_ray(&level.frame, ray_id);
+    BlockCoords cell;
+    const uint side = kSide(level, ray, last, t, &cell);
+    if (side == ISO_SIDE_UNKNOWN || side == before) continue;
+    hits[ray_id] = hit_at_border(level, ray, last, cell);
+    packet.lanes &= ~(1u << lane);
+    ++num_hits;
+  }
+  return num_hits;
+}
+
+/// Finds where rays are at the end of a level's band.
+template <auto kFindSides, auto kSide>
+inline void find_sides(const HostLevel &level, RayPacket &packet) {
+  const float t = level.frame.band.end_t;
+  kFindSides(level, packet.x, packet.y, packet.lanes, t, packet.sides);
+  for (uint lane = 0; lane < 8; ++lane) {
+    if ((packet.lanes >> lane & 1u) == 0 || packet.sides[lane] != kSideNotCertain) continue;
+    const Ray ray = make_ray(&level.frame, ray_of_packet(level.frame, packet, lane));
+    BlockCoords cell;
+    packet.sides[lane] = static_cast<uchar>(kSide(level, ray, last_planes(&level.frame), t, &cell));
+  }
+}
+
+/// trace_rays_of_levels() in packets.
+template <auto kTraceBand, auto kFindSides, auto kSide>
+inline uint trace_levels(std::span<const HostLevel> levels, const RayTile &tile, bool is_smooth,
+                         HitRecord *hits) {
+  uint num_hits = 0;
+  for (uint y = tile.begin_y; y < tile.end_y; y += 2) {
+    for (uint x = tile.begin_x; x < tile.end_x; x += 4) {
+      const uint columns = tile.end_x - x < 4 ? (1u << (tile.end_x - x)) - 1 : 0xFu;
+      RayPacket packet = {x, y, y + 1 < tile.end_y ? columns | columns << 4 : columns, {}};
+      for (const HostLevel &level : levels) {
+        if (&level != levels.data())
+          num_hits += hit_at_borders<kFindSides, kSide>(level, packet, hits);
+        const uint found = kTraceBand(level, x, y, packet.lanes, hits);
+        num_hits += static_cast<uint>(std::popcount(found));
+        packet.lanes &= ~found;
+        if (packet.lanes == 0) break;
+        if (&level != &levels.back()) find_sides<kFindSides, kSide>(level, packet);
+      }
+    }
+  }
+  if (is_smooth && num_hits != 0) smooth_levels(levels, tile, hits);
+  return num_hits;
+}
+#endif
 
 template <auto kTraceRay>
 inline void cast(const FrameParams &frame, const HostField &field, const IndexRay *rays,
@@ -418,10 +498,10 @@ ISO_WHOLE_LOOP void ranges_anywhere(const EncodedBlock &block, BlockRange *parts
 ISO_WHOLE_LOOP ulong inside_anywhere(const float *values, float isovalue) {
   return inside(values, isovalue);
 }
-ISO_OF_ITS_OWN ISO_WHOLE_LOOP uint trace_levels_anywhere(std::span<const HostLevel> levels,
-                                                         const RayTile &tile, bool is_smooth,
-                                                         HitRecord *hits) {
-  return trace_levels<trace_ray_anywhere, side_anywhere>(levels, tile, is_smooth, hits);
+ISO_OF_ITS_OWN ISO_WHOLE_LOOP uint trace_rays_of_levels_anywhere(std::span<const HostLevel> levels,
+                                                                 const RayTile &tile,
+                                                                 bool is_smooth, HitRecord *hits) {
+  return trace_rays_of_levels<trace_ray_anywhere, side_anywhere>(levels, tile, is_smooth, hits);
 }
 ISO_WHOLE_LOOP void cast_anywhere(const FrameParams &frame, const HostField &field,
                                   const IndexRay *rays, uint num_rays, bool is_smooth,
@@ -471,10 +551,15 @@ ISO_WIDE_LOOP uint trace_wide(const FrameParams &frame, const HostField &field, 
   if (is_smooth && num_hits > 0) smooth(frame, field, tile, hits);
   return num_hits;
 }
-ISO_OF_ITS_OWN ISO_WIDE_LOOP uint trace_levels_wide(std::span<const HostLevel> levels,
-                                                    const RayTile &tile, bool is_smooth,
-                                                    HitRecord *hits) {
-  return trace_levels<trace_ray_wide, side_wide>(levels, tile, is_smooth, hits);
+ISO_WIDE_LOOP uint trace_levels_wide(std::span<const HostLevel> levels, const RayTile &tile,
+                                     bool is_smooth, HitRecord *hits) {
+  return trace_levels<trace_band_packet, find_packet_sides, side_wide>(levels, tile, is_smooth,
+                                                                       hits);
+}
+ISO_OF_ITS_OWN ISO_WIDE_LOOP uint trace_rays_of_levels_wide(std::span<const HostLevel> levels,
+                                                            const RayTile &tile, bool is_smooth,
+                                                            HitRecord *hits) {
+  return trace_rays_of_levels<trace_ray_wide, side_wide>(levels, tile, is_smooth, hits);
 }
 ISO_WIDE_LOOP void cast_wide(const FrameParams &frame, const HostField &field, const IndexRay *rays,
                              uint num_rays, bool is_smooth, HitRecord *hits) {
@@ -498,6 +583,12 @@ uint trace_sse4(const FrameParams &frame, const HostField &field, const RayTile 
   return num_hits;
 }
 
+ISO_WHOLE_LOOP uint trace_levels_sse4(std::span<const HostLevel> levels, const RayTile &tile,
+                                      bool is_smooth, HitRecord *hits) {
+  return trace_levels<trace_band_packet_sse4, find_packet_sides_sse4, side_anywhere>(
+      levels, tile, is_smooth, hits);
+}
+
 /// With fused multiply-add, single rays are faster.
 bool is_narrow() {
   return __builtin_cpu_supports("sse4.1") && __builtin_cpu_supports("popcnt") &&
@@ -511,15 +602,15 @@ bool is_wide() {
 #endif
 
 constexpr HostLoops kLoops[] = {
-    {decode_anywhere, ranges_anywhere, inside_anywhere, trace_rays<trace_levels_anywhere>,
-     trace_rays<trace_levels_anywhere>, trace_levels_anywhere, cast_anywhere, ambient_anywhere,
-     shade_anywhere},
+    {decode_anywhere, ranges_anywhere, inside_anywhere, trace_rays<trace_rays_of_levels_anywhere>,
+     trace_rays<trace_rays_of_levels_anywhere>, trace_rays_of_levels_anywhere,
+     trace_rays_of_levels_anywhere, cast_anywhere, ambient_anywhere, shade_anywhere},
 #ifdef ISO_HAS_WIDE_LOOPS
     {decode_anywhere, ranges_anywhere, inside_anywhere, trace_sse4,
-     trace_rays<trace_levels_anywhere>, trace_levels_anywhere, cast_anywhere, ambient_anywhere,
-     shade_anywhere},
-    {decode_wide, ranges_wide, inside_wide, trace_wide, trace_rays<trace_levels_wide>,
-     trace_levels_wide, cast_wide, ambient_wide, shade_wide},
+     trace_rays<trace_rays_of_levels_anywhere>, trace_levels_sse4, trace_rays_of_levels_anywhere,
+     cast_anywhere, ambient_anywhere, shade_anywhere},
+    {decode_wide, ranges_wide, inside_wide, trace_wide, trace_rays<trace_rays_of_levels_wide>,
+     trace_levels_wide, trace_rays_of_levels_wide, cast_wide, ambient_wide, shade_wide},
 #endif
 };
 

@@ -112,9 +112,13 @@ struct HostLoops {
   /// The same, ray by ray; trace() is compared with it.
   uint (*trace_rays)(const FrameParams &frame, const HostField &field, const RayTile &tile,
                      bool is_smooth, HitRecord *hits);
-  /// The same for a frame that several levels of detail draw, the finest first, each its band.
+  /// The same as trace() for a frame that several levels of detail draw, the finest first, each its
+  /// band.
   uint (*trace_levels)(std::span<const HostLevel> levels, const RayTile &tile, bool is_smooth,
                        HitRecord *hits);
+  /// The same, ray by ray.
+  uint (*trace_rays_of_levels)(std::span<const HostLevel> levels, const RayTile &tile,
+                               bool is_smooth, HitRecord *hits);
   /// Writes the hits of rays into hits [num_rays], only for rays that hit something.
   ///
   /// frame      as for trace(); its view is not used

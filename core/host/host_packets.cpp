@@ -12,6 +12,7 @@
 
 #include "core/frame/solvers.hpp"
 #include "kernels_cl/portable/cell_intersect.h"
+#include "kernels_cl/portable/ray_state.h"
 
 // Compilers split vectors that are too wide for a function's processor before they inline it. So
 // all that has such vectors is compiled for the processor; what both kinds run is included before.
@@ -35,6 +36,12 @@ namespace isowave::core {
 uint trace_packets(const FrameParams &frame, const HostField &field, const RayTile &tile,
                    HitRecord *hits) {
   return packets_avx2::trace_tile(frame, field, tile, hits);
+}
+uint trace_band_packet(const HostLevel &level, uint x, uint y, uint lanes, HitRecord *hits) {
+  return packets_avx2::trace_band(level, x, y, lanes, hits);
+}
+void find_packet_sides(const HostLevel &level, uint x, uint y, uint lanes, float t, uchar *sides) {
+  packets_avx2::find_sides(level, x, y, lanes, t, sides);
 }
 
 }  // namespace isowave::core

@@ -13,6 +13,7 @@
 
 #include "core/frame/solvers.hpp"
 #include "kernels_cl/portable/cell_intersect.h"
+#include "kernels_cl/portable/ray_state.h"
 
 #if defined(__clang__)
 #pragma clang attribute push(__attribute__((target("sse4.1,popcnt"))), apply_to = function)
@@ -34,6 +35,13 @@ namespace isowave::core {
 uint trace_packets_sse4(const FrameParams &frame, const HostField &field, const RayTile &tile,
                         HitRecord *hits) {
   return packets_sse4::trace_tile(frame, field, tile, hits);
+}
+uint trace_band_packet_sse4(const HostLevel &level, uint x, uint y, uint lanes, HitRecord *hits) {
+  return packets_sse4::trace_band(level, x, y, lanes, hits);
+}
+void find_packet_sides_sse4(const HostLevel &level, uint x, uint y, uint lanes, float t,
+                            uchar *sides) {
+  packets_sse4::find_sides(level, x, y, lanes, t, sides);
 }
 
 }  // namespace isowave::core

@@ -127,10 +127,11 @@ void HostRenderer::draw_bands(const FrameRequest &request, std::span<const HostL
           std::fill(row + tile.begin_x, row + tile.end_x, no_hit());
         }
         const RayTile part = within(tile, first.frame.screen);
-        num_hits +=
-            is_alone || drawing.size() > 1
-                ? host_loops().trace_levels(drawing, part, is_smooth, hits_.data())
-                : host_loops().trace(first.frame, first.field, part, is_smooth, hits_.data());
+        const HostLoops &loops = host_loops();
+        num_hits += drawing.size() == 1 && !is_alone
+                        ? loops.trace(first.frame, first.field, part, is_smooth, hits_.data())
+                        : (is_alone ? loops.trace_rays_of_levels : loops.trace_levels)(
+                              drawing, part, is_smooth, hits_.data());
       },
       [&](std::uint32_t rows) {
         PassStats pass;

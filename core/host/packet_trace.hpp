@@ -9,6 +9,7 @@
 #include "core/frame/solvers.hpp"
 #include "core/host/float8.hpp"
 #include "core/host/host_loops.hpp"
+#include "core/host/host_packets.hpp"
 #include "kernels_cl/portable/cell_intersect.h"
 
 namespace isowave::core::ISO_PACKET_NAMESPACE {
@@ -67,20 +68,40 @@ inline Mask load_corners(const PacketField *field, const FrameParams *frame, con
 
 namespace isowave::core::ISO_PACKET_NAMESPACE {
 
-/// Traces rays (column, row) of the frame in the given lanes. Returns how many hit something.
-inline uint trace_packet(const PacketScene &scene, Ints column, Ints row, Mask lanes,
+/// The rays of a packet lie in 4 columns and 2 rows from (x, y) on.
+inline Ints columns_from(uint x) {
+  return static_cast<int>(x) + Ints{0, 1, 2, 3, 0, 1, 2, 3};
+}
+inline Ints rows_from(uint y) {
+  return static_cast<int>(y) + Ints{0, 0, 0, 0, 1, 1, 1, 1};
+}
+inline Mask lanes_of(uint bits) {
+  return -(static_cast<int>(bits) >> Ints{0, 1, 2, 3, 4, 5, 6, 7} & 1);
+}
+
+inline PacketRays make_packet_rays(const FrameParams &frame, Ints column, Ints row) {
+  PacketRays rays;
+  make_packet_axes(&frame, column, row, rays.axis);
+  rays.begin_t = frame.band.begin_t;
+  rays.end_t = frame.band.end_t;
+  return rays;
+}
+
+/// Traces rays (column, row) of the frame in the given lanes, in the band of the frame's level.
+/// Returns the lanes that hit something.
+inline Mask trace_packet(const PacketScene &scene, Ints column, Ints row, Mask lanes,
                          HitRecord *hits) {
   Packet p;
-  make_packet_axes(scene.frame, column, row, p.rays.axis);
+  p.rays = make_packet_rays(*scene.frame, column, row);
   const Mask enters = enter_box(&p.rays, &scene) & lanes;
-  if (!any(enters)) return 0;
+  if (!any(enters)) return enters;
   open_packet(&p, &scene);
   begin_at_box(&p, &scene, enters);
   walk_packet(&p, &scene);
-  if (!any(p.found.lanes)) return 0;
+  if (!any(p.found.lanes)) return p.found.lanes;
   write_hits(&p, &scene, column + static_cast<int>(scene.frame->view.width) * row,
              kDefaultSolver.max_steps, hits);
-  return static_cast<uint>(std::popcount(bits_of(p.found.lanes)));
+  return p.found.lanes;
 }
 
 /// As trace_packets().
@@ -88,18 +109,76 @@ __attribute__((flatten)) inline uint trace_tile(const FrameParams &frame, const 
                                                 const RayTile &tile, HitRecord *hits) {
   PacketScene scene;
   if (!make_packet_scene(&frame, &field, &scene)) return 0;
-  const Ints column_of_lane = {0, 1, 2, 3, 0, 1, 2, 3}, row_of_lane = {0, 0, 0, 0, 1, 1, 1, 1};
   uint num_hits = 0;
   for (uint y = tile.begin_y; y < tile.end_y; y += 2) {
     for (uint x = tile.begin_x; x < tile.end_x; x += 4) {
-      const Ints column = static_cast<int>(x) + column_of_lane,
-                 row = static_cast<int>(y) + row_of_lane;
+      const Ints column = columns_from(x), row = rows_from(y);
       const Mask within =
           (column < static_cast<int>(tile.end_x)) & (row < static_cast<int>(tile.end_y));
-      num_hits += trace_packet(scene, column, row, within, hits);
+      num_hits +=
+          static_cast<uint>(std::popcount(bits_of(trace_packet(scene, column, row, within, hits))));
     }
   }
   return num_hits;
+}
+
+/// As trace_band_packet().
+__attribute__((flatten)) inline uint trace_band(const HostLevel &level, uint x, uint y, uint lanes,
+                                                HitRecord *hits) {
+  PacketScene scene;
+  if (!make_packet_scene(&level.frame, &level.field, &scene)) return 0;
+  return bits_of(trace_packet(scene, columns_from(x), rows_from(y), lanes_of(lanes), hits));
+}
+
+/// The blocks in which rays are at t, as far as float32 knows.
+struct BlocksAtBorder {
+  Mask within;   ///< lanes that are in the domain then
+  Mask certain;  ///< lanes for which that and the block are certain
+  Ints at[3];
+};
+
+inline BlocksAtBorder blocks_at_border(const PacketScene &scene, const PacketRays &rays, float t) {
+  BlocksAtBorder blocks;
+  blocks.within = blocks.certain = ints(-1);
+  ISO_EACH_OF_3(axis) {
+    const PacketAxis *a = &rays.axis[axis];
+    const Floats position = fma(floats(t), a->d, a->o), at = in_brick(a, position),
+                 error = ISO_FLOAT_DOUBT * (fabs(position) + fabs(a->o)),
+                 last = floats(static_cast<float>(scene.last[axis]));
+    blocks.within &= (at > 0.0f) & (at < last);
+    blocks.certain &= (fabs(at - 4.0f * rint(0.25f * at)) > error) & (fabs(at - last) > error);
+    const Floats not_below = larger(at, floats(0.0f)), within = smaller(not_below, last);
+    blocks.at[axis] = to_ints(0.25f * within);
+  }
+  return blocks;
+}
+
+/// As find_packet_sides().
+__attribute__((flatten)) inline void find_sides(const HostLevel &level, uint x, uint y, uint lanes,
+                                                float t, uchar *sides) {
+  const FrameParams &frame = level.frame;
+  const HostField &field = level.field;
+  PacketScene scene;
+  make_packet_scene(&frame, &field, &scene);
+  const PacketRays rays = make_packet_rays(frame, columns_from(x), rows_from(y));
+  const BlocksAtBorder blocks = blocks_at_border(scene, rays, t);
+  const Mask of = lanes_of(lanes), asked = of & blocks.within & blocks.certain;
+  ISO_EACH_LANE(lane, of & ~asked) {
+    sides[lane] = blocks.certain[lane] != 0 ? ISO_SIDE_UNKNOWN : kSideNotCertain;
+  }
+  ISO_EACH_LANE(lane, asked) {
+    const int bx = blocks.at[0][lane], by = blocks.at[1][lane], bz = blocks.at[2][lane];
+    const auto macrocell = static_cast<ulong>(bx >> 2) +
+                           static_cast<ulong>(scene.columns) *
+                               (static_cast<ulong>(by >> 2) +
+                                static_cast<ulong>(scene.rows) * static_cast<ulong>(bz >> 2));
+    const int bit = (bx & 3) + 4 * (by & 3) + 16 * (bz & 3);
+    sides[lane] =
+        (field.masks[macrocell] >> bit & 1u) != 0 || field.has_gaps ? kSideNotCertain
+        : field.highs[64 * macrocell + static_cast<ulong>(bit)] - frame.surface.isovalue >= 0.0f
+            ? ISO_SIDE_INSIDE
+            : ISO_SIDE_OUTSIDE;
+  }
 }
 
 }  // namespace isowave::core::ISO_PACKET_NAMESPACE

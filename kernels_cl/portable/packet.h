@@ -21,7 +21,10 @@ typedef struct PacketAxis {
   Floats sign;  ///< 1 or -1, by up
 } PacketAxis;
 
-/// The plane that each ray crosses; axis ISO_AXIS_START: the ray starts there.
+/// Instead of an axis, the end of the rays' band, which is on no plane.
+#define ISO_AXIS_END 4
+
+/// The plane that each ray crosses; axis ISO_AXIS_START: the ray starts there, or enters its band.
 typedef struct Crossings {
   Ints axis;
   Floats plane;
@@ -39,7 +42,19 @@ typedef struct Cubics {
 typedef struct PacketRays {
   PacketAxis axis[3];
   Crossings entered;  ///< by which rays entered the regions where they are
+  /* Of a level's band; used if ISO_BANDS is 1: */
+  float begin_t, end_t;
 } PacketRays;
+
+/// The moment at which rays start, or enter their band.
+ISO_INLINE float packet_begin_t(const PacketRays *r) {
+  return ISO_BANDS ? r->begin_t : 0.0f;
+}
+
+/// Does the rays' band end?
+ISO_INLINE int packet_band_ends(const PacketRays *r) {
+  return ISO_BANDS && r->end_t < ISO_NEVER;
+}
 
 // ---- Crossings and cells
 
@@ -191,7 +206,7 @@ ISO_INLINE Ray ray_of_lane(const PacketRays *rays, int lane) {
 }
 ISO_INLINE RayEvent event_of_lane(const PacketRays *rays, int lane) {
   const int axis = rays->entered.axis[lane];
-  if (axis == ISO_AXIS_START) return start_event();
+  if (axis == ISO_AXIS_START) return border_event(packet_begin_t(rays));
   return make_event(plane_t(axis_of_lane(&rays->axis[axis], lane), rays->entered.plane[lane]),
                     axis);
 }
@@ -210,7 +225,7 @@ ISO_INLINE Floats entry_t(const PacketRays *r) {
   const Ints axis = r->entered.axis;
   const Floats from = of_axis(axis, r->axis[0].from, r->axis[1].from, r->axis[2].from),
                rate = of_axis(axis, r->axis[0].rate, r->axis[1].rate, r->axis[2].rate);
-  return pick(axis == ISO_AXIS_START, floats(0.0f), (r->entered.plane - from) * rate);
+  return pick(axis == ISO_AXIS_START, floats(packet_begin_t(r)), (r->entered.plane - from) * rate);
 }
 
 /// When they cross those planes, in two-float.
@@ -219,8 +234,12 @@ ISO_INLINE TwoFloats crossing_t(const PacketRays *r, Crossings c) {
       of_axis(c.axis, r->axis[0].o, r->axis[1].o, r->axis[2].o),
       of_axis(c.axis, r->axis[0].inv_hi, r->axis[1].inv_hi, r->axis[2].inv_hi),
       of_axis(c.axis, r->axis[0].inv_lo, r->axis[1].inv_lo, r->axis[2].inv_lo), c.plane);
-  t.hi = pick(c.axis == ISO_AXIS_START, floats(0.0f), t.hi);
+  t.hi = pick(c.axis == ISO_AXIS_START, floats(packet_begin_t(r)), t.hi);
   t.lo = pick(c.axis == ISO_AXIS_START, floats(0.0f), t.lo);
+  if (packet_band_ends(r)) {
+    t.hi = pick(c.axis == ISO_AXIS_END, floats(r->end_t), t.hi);
+    t.lo = pick(c.axis == ISO_AXIS_END, floats(0.0f), t.lo);
+  }
   return t;
 }
 
@@ -305,7 +324,7 @@ typedef struct Entry {
 /// near [3]: by which rays enter a region.
 ISO_INLINE Entry last_entry(const PacketRays *r, const Floats *near) {
   Entry entry;
-  entry.t = floats(0.0f);
+  entry.t = floats(packet_begin_t(r));
   entry.before = floats(-ISO_NEVER);
   entry.at.axis = ints(ISO_AXIS_START);
   entry.at.plane = floats(0.0f);

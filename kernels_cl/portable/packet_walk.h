@@ -99,7 +99,14 @@ ISO_INLINE void leave_by(Packet *p, int level, Mask lanes, Exits exits) {
   if (level < ISO_MACROCELLS && any(left)) leave_regions(p, ISO_MACROCELLS, left, &by);
 }
 
-/// Takes all lanes that walk among the regions of a level to the next one.
+/// Lanes that have entered their regions behind the end of their band, by float32 without doubt.
+/// test_cells() finds the others.
+ISO_INLINE Mask behind_band(const PacketRays *r, Mask lanes) {
+  return lanes & (entry_t(r) > r->end_t + 2.0f * ISO_FLOAT_DOUBT * r->end_t);
+}
+
+/// Takes all lanes that walk among the regions of a level to the next one, unless their band ends
+/// before.
 ISO_INLINE void step_to_next(Packet *p, int level) {
   const Mask lanes = p->at[level];
   const Floats *far = p->level[level].far;
@@ -109,6 +116,10 @@ ISO_INLINE void step_to_next(Packet *p, int level) {
     p->rays.entered.plane = pick(exits.on[axis], far[axis], p->rays.entered.plane);
   }
   leave_by(p, level, lanes, exits);
+  if (level != ISO_CELLS && packet_band_ends(&p->rays)) {
+    const Mask behind = behind_band(&p->rays, lanes);
+    ISO_EACH_OF_3(of) p->at[of] &= ~behind;
+  }
 }
 
 ISO_INLINE void walk_macrocells(Packet *p, const PacketScene *scene) {
@@ -258,22 +269,34 @@ ISO_INLINE Mask load_cells(const Packet *p, const PacketScene *scene, const Floa
   return load_corners(scene->field, scene->frame, at, lanes, w);
 }
 
-/// Tests the cells where lanes stand. Those that find no hit walk on.
+/// passes_border() at the end of the rays' band.
+ISO_INLINE Mask passes_end(const PacketRays *r, Crossings c) {
+  const TwoFloats t = crossing_t(r, c);
+  return (t.hi > r->end_t) | ((t.hi == r->end_t) & (t.lo > 0.0f));
+}
+
+/// Tests the cells where lanes stand, up to the end of their band. Those that find no hit walk on.
 ISO_INLINE void test_cells(Packet *p, const PacketScene *scene, Mask standing) {
   const Floats *far = p->level[ISO_CELLS].far;
   Floats cell[3];
   Segments s;
   ISO_EACH_OF_3(axis) cell[axis] = pick(p->rays.axis[axis].up, far[axis] - 1.0f, far[axis]);
-  const Mask waits = load_cells(p, scene, cell, standing, s.w), lanes = standing & ~waits;
+  const Mask waits = load_cells(p, scene, cell, standing, s.w);
+  Mask lanes = standing & ~waits, ends = ints(0);
   p->waits |= waits;
   const Exits exits = find_exits(&p->rays, far, lanes);
   Crossings exit;
   exit.axis = pick(exits.on[0], ints(0), pick(exits.on[1], ints(1), ints(2)));
   exit.plane = pick(exits.on[0], far[0], pick(exits.on[1], far[1], far[2]));
+  if (packet_band_ends(&p->rays)) {
+    lanes &= ~passes_end(&p->rays, p->rays.entered);
+    ends = lanes & passes_end(&p->rays, exit);
+    exit.axis = pick(ends, ints(ISO_AXIS_END), exit.axis);
+  }
   find_segments(&p->rays, p->rays.entered, exit, cell, &s);
   const Brackets found = packet_isolate(&s, lanes);
   if (any(found.lanes)) keep_found(&p->found, found, p->rays.entered, exit, cell);
-  const Mask on = lanes & ~found.lanes;
+  const Mask on = lanes & ~(found.lanes | ends);
   if (!any(on)) return;
   Exits on_exits;
   ISO_EACH_OF_3(axis) on_exits.on[axis] = exits.on[axis] & on;
