@@ -371,69 +371,66 @@ inline uint trace_rays_of_levels(std::span<const HostLevel> levels, const RayTil
 /// Eight rays of a frame: 4 columns and 2 rows from (x, y) on.
 struct RayPacket {
   uint x, y;
-  uint lanes;      ///< bit column + 4 row: the rays that have no hit yet
-  uchar sides[8];  ///< where they were at the end of the last band
+  uint lanes;       ///< bit column + 4 row: the rays that have no hit yet
+  uchar before[8];  ///< where they were at the end of the last band
+  BandSides sides;  ///< of this band
+
+  uint ray_id(const FrameParams &frame, uint lane) const {
+    return x + lane % 4 + frame.view.width * (y + lane / 4);
+  }
 };
 
-inline uint ray_of_packet(const FrameParams &frame, const RayPacket &packet, uint lane) {
-  return packet.x + lane % 4 + frame.view.width * (packet.y + lane / 4);
-}
-
 /// Lets rays hit at the border at which a level's band begins, if the level before has them on the
-/// other side of the surface. Returns the number of hits.
-template <auto kFindSides, auto kSide>
-inline uint hit_at_borders(const HostLevel &level, RayPacket &packet, HitRecord *hits) {
+/// other side of the surface. Returns these rays.
+template <auto kSide>
+inline uint hit_at_borders(const HostLevel &level, const RayPacket &packet, HitRecord *hits) {
   const LastPlanes last = last_planes(&level.frame);
-  const float t = level.frame.band.begin_t;
-  uchar sides[8];
-  uint num_hits = 0;
-  kFindSides(level, packet.x, packet.y, packet.lanes, t, sides);
-  for (uint lane = 0; lane < 8; ++lane) {
-    const uint before = packet.sides[lane];
-    if ((packet.lanes >> lane & 1u) == 0 || before == ISO_SIDE_UNKNOWN) continue;
-    if (sides[lane] == ISO_SIDE_UNKNOWN || sides[lane] == before) continue;
-    const uint ray_id = ray_of_packet(level.frame, packet, lane);
+  uint found = 0;
+  for (uint left = packet.lanes; left != 0; left &= left - 1) {
+    const auto lane = static_cast<uint>(std::countr_zero(left));
+    const uint before = packet.before[lane], at_begin = packet.sides.at_begin[lane];
+    if (before == ISO_SIDE_UNKNOWN || at_begin == ISO_SIDE_UNKNOWN || at_begin == before) continue;
+    const uint ray_id = packet.ray_id(level.frame, lane);
     const Ray ray = make_ray(&level.frame, ray_id);
     BlockCoords cell;
-    const uint side = kSide(level, ray, last, t, &cell);
+    const uint side = kSide(level, ray, last, level.frame.band.begin_t, &cell);
     if (side == ISO_SIDE_UNKNOWN || side == before) continue;
     hits[ray_id] = hit_at_border(level, ray, last, cell);
-    packet.lanes &= ~(1u << lane);
-    ++num_hits;
+    found |= 1u << lane;
   }
-  return num_hits;
+  return found;
 }
 
-/// Finds where rays are at the end of a level's band.
-template <auto kFindSides, auto kSide>
-inline void find_sides(const HostLevel &level, RayPacket &packet) {
-  const float t = level.frame.band.end_t;
-  kFindSides(level, packet.x, packet.y, packet.lanes, t, packet.sides);
-  for (uint lane = 0; lane < 8; ++lane) {
-    if ((packet.lanes >> lane & 1u) == 0 || packet.sides[lane] != kSideNotCertain) continue;
-    const Ray ray = make_ray(&level.frame, ray_of_packet(level.frame, packet, lane));
+/// packet.before = where the rays are at the end of a level's band.
+template <auto kSide>
+inline void end_band(const HostLevel &level, RayPacket &packet) {
+  for (uint left = packet.lanes; left != 0; left &= left - 1) {
+    const auto lane = static_cast<uint>(std::countr_zero(left));
+    packet.before[lane] = packet.sides.at_end[lane];
+    if (packet.before[lane] != kSideNotCertain) continue;
+    const Ray ray = make_ray(&level.frame, packet.ray_id(level.frame, lane));
     BlockCoords cell;
-    packet.sides[lane] = static_cast<uchar>(kSide(level, ray, last_planes(&level.frame), t, &cell));
+    packet.before[lane] = static_cast<uchar>(
+        kSide(level, ray, last_planes(&level.frame), level.frame.band.end_t, &cell));
   }
 }
 
 /// trace_rays_of_levels() in packets.
-template <auto kTraceBand, auto kFindSides, auto kSide>
+template <auto kTraceBand, auto kSide>
 inline uint trace_levels(std::span<const HostLevel> levels, const RayTile &tile, bool is_smooth,
                          HitRecord *hits) {
   uint num_hits = 0;
   for (uint y = tile.begin_y; y < tile.end_y; y += 2) {
     for (uint x = tile.begin_x; x < tile.end_x; x += 4) {
       const uint columns = tile.end_x - x < 4 ? (1u << (tile.end_x - x)) - 1 : 0xFu;
-      RayPacket packet = {x, y, y + 1 < tile.end_y ? columns | columns << 4 : columns, {}};
+      RayPacket packet = {x, y, y + 1 < tile.end_y ? columns | columns << 4 : columns, {}, {}};
       for (const HostLevel &level : levels) {
-        if (&level != levels.data())
-          num_hits += hit_at_borders<kFindSides, kSide>(level, packet, hits);
-        const uint found = kTraceBand(level, x, y, packet.lanes, hits);
+        uint found = kTraceBand(level, x, y, packet.lanes, hits, &packet.sides);
+        if (&level != levels.data()) found |= hit_at_borders<kSide>(level, packet, hits);
         num_hits += static_cast<uint>(std::popcount(found));
         packet.lanes &= ~found;
         if (packet.lanes == 0) break;
-        if (&level != &levels.back()) find_sides<kFindSides, kSide>(level, packet);
+        if (&level != &levels.back()) end_band<kSide>(level, packet);
       }
     }
   }
@@ -553,8 +550,7 @@ ISO_WIDE_LOOP uint trace_wide(const FrameParams &frame, const HostField &field, 
 }
 ISO_WIDE_LOOP uint trace_levels_wide(std::span<const HostLevel> levels, const RayTile &tile,
                                      bool is_smooth, HitRecord *hits) {
-  return trace_levels<trace_band_packet, find_packet_sides, side_wide>(levels, tile, is_smooth,
-                                                                       hits);
+  return trace_levels<trace_band_packet, side_wide>(levels, tile, is_smooth, hits);
 }
 ISO_OF_ITS_OWN ISO_WIDE_LOOP uint trace_rays_of_levels_wide(std::span<const HostLevel> levels,
                                                             const RayTile &tile, bool is_smooth,
@@ -585,8 +581,7 @@ uint trace_sse4(const FrameParams &frame, const HostField &field, const RayTile 
 
 ISO_WHOLE_LOOP uint trace_levels_sse4(std::span<const HostLevel> levels, const RayTile &tile,
                                       bool is_smooth, HitRecord *hits) {
-  return trace_levels<trace_band_packet_sse4, find_packet_sides_sse4, side_anywhere>(
-      levels, tile, is_smooth, hits);
+  return trace_levels<trace_band_packet_sse4, side_anywhere>(levels, tile, is_smooth, hits);
 }
 
 /// With fused multiply-add, single rays are faster.

@@ -37,11 +37,9 @@ uint trace_packets(const FrameParams &frame, const HostField &field, const RayTi
                    HitRecord *hits) {
   return packets_avx2::trace_tile(frame, field, tile, hits);
 }
-uint trace_band_packet(const HostLevel &level, uint x, uint y, uint lanes, HitRecord *hits) {
-  return packets_avx2::trace_band(level, x, y, lanes, hits);
-}
-void find_packet_sides(const HostLevel &level, uint x, uint y, uint lanes, float t, uchar *sides) {
-  packets_avx2::find_sides(level, x, y, lanes, t, sides);
+uint trace_band_packet(const HostLevel &level, uint x, uint y, uint lanes, HitRecord *hits,
+                       BandSides *sides) {
+  return packets_avx2::trace_band(level, x, y, lanes, hits, sides);
 }
 
 }  // namespace isowave::core

@@ -14,27 +14,29 @@ namespace isowave::core {
 /// popcnt.
 uint trace_packets(const FrameParams &frame, const HostField &field, const RayTile &tile,
                    HitRecord *hits);
+constexpr uchar kSideNotCertain = 3;  ///< besides ISO_SIDE_*
+
+/// The sides of the surface on which eight rays are at the borders of a level's band, by the blocks
+/// that are on one side as a whole. kSideNotCertain: a cell must say, or float32 is not enough.
+struct BandSides {
+  uchar at_begin[8], at_end[8];
+};
+
 /// Traces eight rays, 4 columns and 2 rows from (x, y) on, in the band of a level of detail, and
 /// writes the hits of cells into hits [height * width].
 ///
 /// lanes    bit column + 4 row: the rays to trace
+/// Out      sides: at the beginning of the band, if it is behind the rays' start, of all these
+///          rays; at its end, if there is one, of those that do not hit
 /// Returns  those that hit something
-uint trace_band_packet(const HostLevel &level, uint x, uint y, uint lanes, HitRecord *hits);
-
-constexpr uchar kSideNotCertain = 3;  ///< besides ISO_SIDE_*
-
-/// Finds on which side of the surface the same rays are at a border at t, by the blocks that are on
-/// one side as a whole.
-///
-/// Out  sides [8] of those lanes; kSideNotCertain: a cell must say, or float32 is not enough
-void find_packet_sides(const HostLevel &level, uint x, uint y, uint lanes, float t, uchar *sides);
+uint trace_band_packet(const HostLevel &level, uint x, uint y, uint lanes, HitRecord *hits,
+                       BandSides *sides);
 
 /// The same, for processors with sse4.1 and popcnt.
 uint trace_packets_sse4(const FrameParams &frame, const HostField &field, const RayTile &tile,
                         HitRecord *hits);
-uint trace_band_packet_sse4(const HostLevel &level, uint x, uint y, uint lanes, HitRecord *hits);
-void find_packet_sides_sse4(const HostLevel &level, uint x, uint y, uint lanes, float t,
-                            uchar *sides);
+uint trace_band_packet_sse4(const HostLevel &level, uint x, uint y, uint lanes, HitRecord *hits,
+                            BandSides *sides);
 
 }  // namespace isowave::core
 #endif

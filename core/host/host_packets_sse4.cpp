@@ -36,12 +36,9 @@ uint trace_packets_sse4(const FrameParams &frame, const HostField &field, const 
                         HitRecord *hits) {
   return packets_sse4::trace_tile(frame, field, tile, hits);
 }
-uint trace_band_packet_sse4(const HostLevel &level, uint x, uint y, uint lanes, HitRecord *hits) {
-  return packets_sse4::trace_band(level, x, y, lanes, hits);
-}
-void find_packet_sides_sse4(const HostLevel &level, uint x, uint y, uint lanes, float t,
-                            uchar *sides) {
-  packets_sse4::find_sides(level, x, y, lanes, t, sides);
+uint trace_band_packet_sse4(const HostLevel &level, uint x, uint y, uint lanes, HitRecord *hits,
+                            BandSides *sides) {
+  return packets_sse4::trace_band(level, x, y, lanes, hits, sides);
 }
 
 }  // namespace isowave::core

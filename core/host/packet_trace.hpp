@@ -89,10 +89,10 @@ inline PacketRays make_packet_rays(const FrameParams &frame, Ints column, Ints r
 
 /// Traces rays (column, row) of the frame in the given lanes, in the band of the frame's level.
 /// Returns the lanes that hit something.
-inline Mask trace_packet(const PacketScene &scene, Ints column, Ints row, Mask lanes,
-                         HitRecord *hits) {
+inline Mask trace_packet(const PacketScene &scene, const PacketRays &rays, Ints column, Ints row,
+                         Mask lanes, HitRecord *hits) {
   Packet p;
-  p.rays = make_packet_rays(*scene.frame, column, row);
+  p.rays = rays;
   const Mask enters = enter_box(&p.rays, &scene) & lanes;
   if (!any(enters)) return enters;
   open_packet(&p, &scene);
@@ -115,70 +115,104 @@ __attribute__((flatten)) inline uint trace_tile(const FrameParams &frame, const 
       const Ints column = columns_from(x), row = rows_from(y);
       const Mask within =
           (column < static_cast<int>(tile.end_x)) & (row < static_cast<int>(tile.end_y));
-      num_hits +=
-          static_cast<uint>(std::popcount(bits_of(trace_packet(scene, column, row, within, hits))));
+      num_hits += static_cast<uint>(std::popcount(bits_of(
+          trace_packet(scene, make_packet_rays(frame, column, row), column, row, within, hits))));
     }
   }
   return num_hits;
 }
 
-/// As trace_band_packet().
-__attribute__((flatten)) inline uint trace_band(const HostLevel &level, uint x, uint y, uint lanes,
-                                                HitRecord *hits) {
-  PacketScene scene;
-  if (!make_packet_scene(&level.frame, &level.field, &scene)) return 0;
-  return bits_of(trace_packet(scene, columns_from(x), rows_from(y), lanes_of(lanes), hits));
-}
-
-/// The blocks in which rays are at t, as far as float32 knows.
-struct BlocksAtBorder {
-  Mask within;   ///< lanes that are in the domain then
-  Mask certain;  ///< lanes for which that and the block are certain
+/// The cells in which rays are at t, as far as float32 knows.
+struct CellsAtBorder {
+  Mask within;                     ///< lanes that are in the domain then
+  Mask block_certain, is_certain;  ///< lanes for which that and the block are certain, and the cell
   Ints at[3];
 };
 
-inline BlocksAtBorder blocks_at_border(const PacketScene &scene, const PacketRays &rays, float t) {
-  BlocksAtBorder blocks;
-  blocks.within = blocks.certain = ints(-1);
+inline CellsAtBorder cells_at_border(const PacketScene &scene, const PacketRays &rays, float t) {
+  CellsAtBorder cells;
+  cells.within = cells.block_certain = cells.is_certain = ints(-1);
   ISO_EACH_OF_3(axis) {
     const PacketAxis *a = &rays.axis[axis];
     const Floats position = fma(floats(t), a->d, a->o), at = in_brick(a, position),
                  error = ISO_FLOAT_DOUBT * (fabs(position) + fabs(a->o)),
                  last = floats(static_cast<float>(scene.last[axis]));
-    blocks.within &= (at > 0.0f) & (at < last);
-    blocks.certain &= (fabs(at - 4.0f * rint(0.25f * at)) > error) & (fabs(at - last) > error);
+    cells.within &= (at > 0.0f) & (at < last);
+    cells.block_certain &= (fabs(at - 4.0f * rint(0.25f * at)) > error) & (fabs(at - last) > error);
+    cells.is_certain &= fabs(at - rint(at)) > error;
     const Floats not_below = larger(at, floats(0.0f)), within = smaller(not_below, last);
-    blocks.at[axis] = to_ints(0.25f * within);
+    cells.at[axis] = to_ints(within);
   }
-  return blocks;
+  cells.is_certain &= cells.block_certain;
+  return cells;
 }
 
-/// As find_packet_sides().
-__attribute__((flatten)) inline void find_sides(const HostLevel &level, uint x, uint y, uint lanes,
-                                                float t, uchar *sides) {
+/// On which side of the surface rays are at t, by the blocks and cells that are on one side as a
+/// whole.
+inline void find_sides(const HostLevel &level, const PacketScene &scene, const PacketRays &rays,
+                       float t, Mask lanes, uchar *sides) {
   const FrameParams &frame = level.frame;
   const HostField &field = level.field;
+  const float isovalue = frame.surface.isovalue;
+  const CellsAtBorder cells = cells_at_border(scene, rays, t);
+  const auto side_of = [](bool is_inside) {
+    return static_cast<uchar>(is_inside ? ISO_SIDE_INSIDE : ISO_SIDE_OUTSIDE);
+  };
+  for (int lane = 0; lane < 8; ++lane)
+    sides[lane] = cells.block_certain[lane] != 0 && cells.within[lane] == 0
+                      ? uchar{ISO_SIDE_UNKNOWN}
+                      : kSideNotCertain;
+  const Mask in_blocks = lanes & cells.within & cells.block_certain;
+  if (field.has_gaps || !any(in_blocks)) return;
+  const Ints blocks[3] = {cells.at[0] >> 2, cells.at[1] >> 2, cells.at[2] >> 2};
+  const Ints macrocells = (blocks[0] >> 2) +
+                          scene.columns * ((blocks[1] >> 2) + scene.rows * (blocks[2] >> 2)),
+             places = (blocks[0] & 3) + 4 * (blocks[1] & 3) + 16 * (blocks[2] & 3);
+  Mask in_active = ints(0);
+  ISO_EACH_LANE(lane, in_blocks) {
+    const auto macrocell = static_cast<std::size_t>(macrocells[lane]);
+    const int place = places[lane];
+    if ((field.masks[macrocell] >> place & 1u) != 0) {
+      in_active[lane] = -1;
+    } else {
+      const std::size_t block = 64 * macrocell + static_cast<std::size_t>(place);
+      sides[lane] = side_of(field.highs[block] - isovalue >= 0.0f);
+    }
+  }
+  in_active &= cells.is_certain;
+  if (!any(in_active)) return;
+  Ints low = ints(0), high = ints(0);
+  open_blocks(&field, &frame, blocks, in_active, &low, &high);
+  const Ints cell = (cells.at[0] & 3) + 4 * (cells.at[1] & 3) + 16 * (cells.at[2] & 3);
+  ISO_EACH_LANE(lane, in_active) {
+    const int number = cell[lane];
+    if ((pick(cell < 32, low, high)[lane] >> (number & 31) & 1) != 0) continue;
+    const uint block =
+        level_block_at(&frame, static_cast<uint>(blocks[0][lane]),
+                       static_cast<uint>(blocks[1][lane]), static_cast<uint>(blocks[2][lane]));
+    sides[lane] = side_of(
+        field.values[std::size_t{ISO_BLOCK_VOXELS} * block + static_cast<std::size_t>(number)] -
+            isovalue >=
+        0.0f);
+  }
+}
+
+/// As trace_band_packet().
+__attribute__((flatten)) inline uint trace_band(const HostLevel &level, uint x, uint y, uint lanes,
+                                                HitRecord *hits, BandSides *sides) {
+  const FrameParams &frame = level.frame;
+  const Ints column = columns_from(x), row = rows_from(y);
+  const Mask of = lanes_of(lanes);
+  const PacketRays rays = make_packet_rays(frame, column, row);
   PacketScene scene;
-  make_packet_scene(&frame, &field, &scene);
-  const PacketRays rays = make_packet_rays(frame, columns_from(x), rows_from(y));
-  const BlocksAtBorder blocks = blocks_at_border(scene, rays, t);
-  const Mask of = lanes_of(lanes), asked = of & blocks.within & blocks.certain;
-  ISO_EACH_LANE(lane, of & ~asked) {
-    sides[lane] = blocks.certain[lane] != 0 ? ISO_SIDE_UNKNOWN : kSideNotCertain;
-  }
-  ISO_EACH_LANE(lane, asked) {
-    const int bx = blocks.at[0][lane], by = blocks.at[1][lane], bz = blocks.at[2][lane];
-    const auto macrocell = static_cast<ulong>(bx >> 2) +
-                           static_cast<ulong>(scene.columns) *
-                               (static_cast<ulong>(by >> 2) +
-                                static_cast<ulong>(scene.rows) * static_cast<ulong>(bz >> 2));
-    const int bit = (bx & 3) + 4 * (by & 3) + 16 * (bz & 3);
-    sides[lane] =
-        (field.masks[macrocell] >> bit & 1u) != 0 || field.has_gaps ? kSideNotCertain
-        : field.highs[64 * macrocell + static_cast<ulong>(bit)] - frame.surface.isovalue >= 0.0f
-            ? ISO_SIDE_INSIDE
-            : ISO_SIDE_OUTSIDE;
-  }
+  const bool is_active = make_packet_scene(&frame, &level.field, &scene) != 0;
+  if (frame.band.begin_t > 0)
+    find_sides(level, scene, rays, frame.band.begin_t, of, sides->at_begin);
+  const Mask found = is_active ? trace_packet(scene, rays, column, row, of, hits) : ints(0);
+  const Mask left = of & ~found;
+  if (packet_band_ends(&rays) && any(left))
+    find_sides(level, scene, rays, frame.band.end_t, left, sides->at_end);
+  return bits_of(found);
 }
 
 }  // namespace isowave::core::ISO_PACKET_NAMESPACE
