@@ -41,9 +41,8 @@ typedef struct Cubics {
 /// The places of rays, for the scalar functions.
 typedef struct PacketRays {
   PacketAxis axis[3];
-  Crossings entered;  ///< by which rays entered the regions where they are
-  /* Of a level's band; used if ISO_BANDS is 1: */
-  float begin_t, end_t;
+  Crossings entered;     ///< by which rays entered the regions where they are
+  float begin_t, end_t;  ///< the level's band, if ISO_BANDS is 1
 } PacketRays;
 
 /// The moment at which rays start, or enter their band.

@@ -1,0 +1,192 @@
+#pragma once
+// Rays of a frame that several levels of detail draw, each its band: ray by ray, and in packets of
+// eight. Only host_loops.cpp includes this file.
+
+#include <bit>
+#include <cmath>
+#include <span>
+
+#include "core/host/host_packets.hpp"
+#include "core/host/host_rays.hpp"
+#include "kernels_cl/portable/ray_state.h"
+
+namespace isowave::core {
+
+/// The side on which a whole block is; unknown if it may have cells that change.
+inline uint side_of_block(const FrameParams &frame, const HostField &field, BlockCoords b) {
+  constexpr uint kBlocks = ISO_MACROCELL_BLOCKS;
+  const uint columns = (frame.grid.blocks_x + 3) / 4, rows = (frame.grid.blocks_y + 3) / 4;
+  const ulong macrocell =
+      b.x / kBlocks + columns * (b.y / kBlocks + static_cast<ulong>(rows) * (b.z / kBlocks));
+  const uint bit = b.x % kBlocks + 4 * (b.y % kBlocks) + 16 * (b.z % kBlocks);
+  if (field.has_gaps || (field.masks[macrocell] >> bit & 1u) != 0) return ISO_SIDE_UNKNOWN;
+  return field.highs[64 * macrocell + bit] - frame.surface.isovalue >= 0.0f ? ISO_SIDE_INSIDE
+                                                                            : ISO_SIDE_OUTSIDE;
+}
+
+/// Decodes a cell.
+inline void open_cell(const HostLevel &level, BlockCoords cell, float *w) {
+  level.field.open(level_block_at(&level.frame, cell.x >> 2, cell.y >> 2, cell.z >> 2));
+  load_corners(level.frame, level.field, static_cast<int>(cell.x), static_cast<int>(cell.y),
+               static_cast<int>(cell.z), w);
+}
+
+/// The side on which a ray is at the border at t, which is in *cell; unknown if it does not come to
+/// the border, or is in a cell without data there.
+inline uint side_at_border(const HostLevel &level, const Ray &ray, LastPlanes last, float t,
+                           BlockCoords *cell) {
+  if (!reaches_border(&ray, last, t)) return ISO_SIDE_UNKNOWN;
+  *cell = region_at_border(&ray, last, t, 1);
+  const uint side =
+      side_of_block(level.frame, level.field, {cell->x >> 2, cell->y >> 2, cell->z >> 2});
+  if (side != ISO_SIDE_UNKNOWN) return side;
+  float w[8];
+  open_cell(level, *cell, w);
+  if (lacks_data(w)) return ISO_SIDE_UNKNOWN;
+  return inside_at(&ray, w, border_event(t), static_cast<int>(cell->x), static_cast<int>(cell->y),
+                   static_cast<int>(cell->z), 0)
+             ? ISO_SIDE_INSIDE
+             : ISO_SIDE_OUTSIDE;
+}
+
+/// The hit of a ray at the border at which its band begins, in that cell.
+inline HitRecord hit_at_border(const HostLevel &level, const Ray &ray, LastPlanes last,
+                               BlockCoords cell) {
+  const FrameParams &frame = level.frame;
+  const int x = static_cast<int>(cell.x), y = static_cast<int>(cell.y),
+            z = static_cast<int>(cell.z);
+  const GridWalk walk = walk_from(&ray, x, y, z, 1, last);
+  const RayEvent exit = walk_exit(&walk, &ray);
+  float w[8];
+  open_cell(level, cell, w);
+  return make_hit(&frame, &ray, w, x, y, z, border_event(frame.band.begin_t),
+                  passes_border(exit, frame.band.end_t) ? border_event(frame.band.end_t) : exit,
+                  0.0f);
+}
+
+/// The first hit of a ray, from band to band. If two levels have it on different sides of the
+/// surface, it hits at their border.
+template <auto kTraceRay, auto kSide>
+inline bool trace_bands(std::span<const HostLevel> levels, uint ray_id, HitRecord *hit) {
+  uint before = ISO_SIDE_UNKNOWN;
+  for (const HostLevel &level : levels) {
+    const LastPlanes last = last_planes(&level.frame);
+    const Ray ray = make_ray(&level.frame, ray_id);
+    BlockCoords cell;
+    if (before != ISO_SIDE_UNKNOWN) {
+      const uint side = kSide(level, ray, last, level.frame.band.begin_t, &cell);
+      if (side != ISO_SIDE_UNKNOWN && side != before) {
+        *hit = hit_at_border(level, ray, last, cell);
+        return true;
+      }
+    }
+    const ActiveBox box = active_box(level.frame.surface, last);
+    if (kTraceRay(level.frame, level.field, box, last, ray, hit)) return true;
+    if (&level != &levels.back()) before = kSide(level, ray, last, level.frame.band.end_t, &cell);
+  }
+  return false;
+}
+
+/// Gives the hits of a tile in a level of detail smooth gradients.
+inline void smooth(const FrameParams &frame, const HostField &field, const RayTile &tile,
+                   HitRecord *hits) {
+  const LastPlanes last = last_planes(&frame);
+  for (uint y = tile.begin_y; y < tile.end_y; ++y) {
+    for (uint x = tile.begin_x; x < tile.end_x; ++x) {
+      HitRecord *hit = hits + x + frame.view.width * y;
+      if (is_hit_of(frame, *hit)) smooth_gradient(frame, field, last, hit);
+    }
+  }
+}
+
+inline void smooth_levels(std::span<const HostLevel> levels, const RayTile &tile, HitRecord *hits) {
+  for (const HostLevel &level : levels) smooth(level.frame, level.field, tile, hits);
+}
+
+template <auto kTraceRay, auto kSide>
+inline uint trace_rays_of_levels(std::span<const HostLevel> levels, const RayTile &tile,
+                                 bool is_smooth, HitRecord *hits) {
+  uint num_hits = 0;
+  for (uint y = tile.begin_y; y < tile.end_y; ++y) {
+    for (uint x = tile.begin_x; x < tile.end_x; ++x) {
+      const uint ray_id = x + levels.front().frame.view.width * y;
+      num_hits += trace_bands<kTraceRay, kSide>(levels, ray_id, hits + ray_id);
+    }
+  }
+  if (is_smooth && num_hits != 0) smooth_levels(levels, tile, hits);
+  return num_hits;
+}
+
+#ifdef ISO_HAS_PACKETS
+/// Eight rays of a frame: 4 columns and 2 rows from (x, y) on.
+struct RayPacket {
+  uint x, y;
+  uint lanes;       ///< bit column + 4 row: the rays that have no hit yet
+  uchar before[8];  ///< where they were at the end of the last band
+  BandSides sides;  ///< of this band
+
+  uint ray_id(const FrameParams &frame, uint lane) const {
+    return x + lane % 4 + frame.view.width * (y + lane / 4);
+  }
+};
+
+/// Lets rays hit at the border at which a level's band begins, if the level before has them on the
+/// other side of the surface. Returns these rays.
+template <auto kSide>
+inline uint hit_at_borders(const HostLevel &level, const RayPacket &packet, HitRecord *hits) {
+  const LastPlanes last = last_planes(&level.frame);
+  uint found = 0;
+  for (uint left = packet.lanes; left != 0; left &= left - 1) {
+    const auto lane = static_cast<uint>(std::countr_zero(left));
+    const uint before = packet.before[lane], at_begin = packet.sides.at_begin[lane];
+    if (before == ISO_SIDE_UNKNOWN || at_begin == ISO_SIDE_UNKNOWN || at_begin == before) continue;
+    const uint ray_id = packet.ray_id(level.frame, lane);
+    const Ray ray = make_ray(&level.frame, ray_id);
+    BlockCoords cell;
+    const uint side = kSide(level, ray, last, level.frame.band.begin_t, &cell);
+    if (side == ISO_SIDE_UNKNOWN || side == before) continue;
+    hits[ray_id] = hit_at_border(level, ray, last, cell);
+    found |= 1u << lane;
+  }
+  return found;
+}
+
+/// packet.before = where the rays are at the end of a level's band.
+template <auto kSide>
+inline void end_band(const HostLevel &level, RayPacket &packet) {
+  for (uint left = packet.lanes; left != 0; left &= left - 1) {
+    const auto lane = static_cast<uint>(std::countr_zero(left));
+    packet.before[lane] = packet.sides.at_end[lane];
+    if (packet.before[lane] != kSideNotCertain) continue;
+    const Ray ray = make_ray(&level.frame, packet.ray_id(level.frame, lane));
+    BlockCoords cell;
+    packet.before[lane] = static_cast<uchar>(
+        kSide(level, ray, last_planes(&level.frame), level.frame.band.end_t, &cell));
+  }
+}
+
+/// trace_rays_of_levels() in packets.
+template <auto kTraceBand, auto kSide>
+inline uint trace_levels(std::span<const HostLevel> levels, const RayTile &tile, bool is_smooth,
+                         HitRecord *hits) {
+  uint num_hits = 0;
+  for (uint y = tile.begin_y; y < tile.end_y; y += 2) {
+    for (uint x = tile.begin_x; x < tile.end_x; x += 4) {
+      const uint columns = tile.end_x - x < 4 ? (1u << (tile.end_x - x)) - 1 : 0xFu;
+      RayPacket packet = {x, y, y + 1 < tile.end_y ? columns | columns << 4 : columns, {}, {}};
+      for (const HostLevel &level : levels) {
+        uint found = kTraceBand(level, x, y, packet.lanes, hits, &packet.sides);
+        if (&level != levels.data()) found |= hit_at_borders<kSide>(level, packet, hits);
+        num_hits += static_cast<uint>(std::popcount(found));
+        packet.lanes &= ~found;
+        if (packet.lanes == 0) break;
+        if (&level != &levels.back()) end_band<kSide>(level, packet);
+      }
+    }
+  }
+  if (is_smooth && num_hits != 0) smooth_levels(levels, tile, hits);
+  return num_hits;
+}
+#endif
+
+}  // namespace isowave::core
