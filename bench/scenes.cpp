@@ -45,6 +45,17 @@ const CompressedVolume &mixing_layer(std::int64_t edge, std::int64_t rate) {
   return volume;
 }
 
+const CompressedVolume &mixing_layer_of_levels(std::int64_t edge) {
+  static std::map<std::int64_t, CompressedVolume> volumes;
+  CompressedVolume &volume = volumes[edge];
+  if (volume.words.empty()) {
+    GenerateOptions generate;
+    generate.dims = glm::uvec3(static_cast<std::uint32_t>(edge));
+    volume = compress(*open_generated(generate), {.rate = 4, .levels = 2});
+  }
+  return volume;
+}
+
 const CompressedVolume &exact_mixing_layer(std::int64_t edge) {
   static std::map<std::int64_t, CompressedVolume> volumes;
   CompressedVolume &volume = volumes[edge];

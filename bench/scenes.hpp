@@ -13,6 +13,8 @@ namespace isowave::core::bench {
 const CompressedVolume &mixing_layer(std::int64_t edge, std::int64_t rate = 4);
 inline constexpr float kMixingLayerIsovalue = 0.5f;
 
+/// mixing_layer(edge, 4) with a coarser level of detail.
+const CompressedVolume &mixing_layer_of_levels(std::int64_t edge);
 /// The same as voxels of uint8, without a loss: blocks have lengths of their own.
 const CompressedVolume &exact_mixing_layer(std::int64_t edge);
 
