@@ -79,29 +79,25 @@ inline Mask lanes_of(uint bits) {
   return -(static_cast<int>(bits) >> Ints{0, 1, 2, 3, 4, 5, 6, 7} & 1);
 }
 
-inline PacketRays make_packet_rays(const FrameParams &frame, Ints column, Ints row) {
-  PacketRays rays;
-  make_packet_axes(&frame, column, row, rays.axis);
-  rays.begin_t = frame.band.begin_t;
-  rays.end_t = frame.band.end_t;
-  return rays;
+inline void make_packet_rays(const FrameParams &frame, Ints column, Ints row, PacketRays *rays) {
+  make_packet_axes(&frame, column, row, rays->axis);
+  rays->begin_t = frame.band.begin_t;
+  rays->end_t = frame.band.end_t;
 }
 
-/// Traces rays (column, row) of the frame in the given lanes, in the band of the frame's level.
-/// Returns the lanes that hit something.
-inline Mask trace_packet(const PacketScene &scene, const PacketRays &rays, Ints column, Ints row,
-                         Mask lanes, HitRecord *hits) {
-  Packet p;
-  p.rays = rays;
-  const Mask enters = enter_box(&p.rays, &scene) & lanes;
+/// Traces a packet's rays (column, row) of the frame in the given lanes, in the band of the frame's
+/// level. Returns the lanes that hit something.
+inline Mask trace_packet(const PacketScene &scene, Ints column, Ints row, Mask lanes,
+                         HitRecord *hits, Packet *p) {
+  const Mask enters = enter_box(&p->rays, &scene) & lanes;
   if (!any(enters)) return enters;
-  open_packet(&p, &scene);
-  begin_at_box(&p, &scene, enters);
-  walk_packet(&p, &scene);
-  if (!any(p.found.lanes)) return p.found.lanes;
-  write_hits(&p, &scene, column + static_cast<int>(scene.frame->view.width) * row,
+  open_packet(p, &scene);
+  begin_at_box(p, &scene, enters);
+  walk_packet(p, &scene);
+  if (!any(p->found.lanes)) return p->found.lanes;
+  write_hits(p, &scene, column + static_cast<int>(scene.frame->view.width) * row,
              kDefaultSolver.max_steps, hits);
-  return p.found.lanes;
+  return p->found.lanes;
 }
 
 /// As trace_packets().
@@ -115,8 +111,10 @@ __attribute__((flatten)) inline uint trace_tile(const FrameParams &frame, const 
       const Ints column = columns_from(x), row = rows_from(y);
       const Mask within =
           (column < static_cast<int>(tile.end_x)) & (row < static_cast<int>(tile.end_y));
-      num_hits += static_cast<uint>(std::popcount(bits_of(
-          trace_packet(scene, make_packet_rays(frame, column, row), column, row, within, hits))));
+      Packet p;
+      make_packet_rays(frame, column, row, &p.rays);
+      const Mask found = trace_packet(scene, column, row, within, hits, &p);
+      num_hits += static_cast<uint>(std::popcount(bits_of(found)));
     }
   }
   return num_hits;
@@ -203,15 +201,16 @@ __attribute__((flatten)) inline uint trace_band(const HostLevel &level, uint x, 
   const FrameParams &frame = level.frame;
   const Ints column = columns_from(x), row = rows_from(y);
   const Mask of = lanes_of(lanes);
-  const PacketRays rays = make_packet_rays(frame, column, row);
+  Packet p;
+  make_packet_rays(frame, column, row, &p.rays);
   PacketScene scene;
   const bool is_active = make_packet_scene(&frame, &level.field, &scene) != 0;
   if (frame.band.begin_t > 0)
-    find_sides(level, scene, rays, frame.band.begin_t, of, sides->at_begin);
-  const Mask found = is_active ? trace_packet(scene, rays, column, row, of, hits) : ints(0);
+    find_sides(level, scene, p.rays, frame.band.begin_t, of, sides->at_begin);
+  const Mask found = is_active ? trace_packet(scene, column, row, of, hits, &p) : ints(0);
   const Mask left = of & ~found;
-  if (packet_band_ends(&rays) && any(left))
-    find_sides(level, scene, rays, frame.band.end_t, left, sides->at_end);
+  if (packet_band_ends(&p.rays) && any(left))
+    find_sides(level, scene, p.rays, frame.band.end_t, left, sides->at_end);
   return bits_of(found);
 }
 
