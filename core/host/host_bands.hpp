@@ -49,9 +49,9 @@ inline uint side_at_border(const HostLevel &level, const Ray &ray, LastPlanes la
              : ISO_SIDE_OUTSIDE;
 }
 
-/// The hit of a ray at the border at which its band begins, in that cell.
-inline HitRecord hit_at_border(const HostLevel &level, const Ray &ray, LastPlanes last,
-                               BlockCoords cell) {
+/// The hit of a ray at the border at which its band begins, in that cell. Few rays have one.
+__attribute__((noinline)) inline HitRecord hit_at_border(const HostLevel &level, const Ray &ray,
+                                                         LastPlanes last, BlockCoords cell) {
   const FrameParams &frame = level.frame;
   const int x = static_cast<int>(cell.x), y = static_cast<int>(cell.y),
             z = static_cast<int>(cell.z);
@@ -99,13 +99,9 @@ inline void smooth(const FrameParams &frame, const HostField &field, const RayTi
   }
 }
 
-inline void smooth_levels(std::span<const HostLevel> levels, const RayTile &tile, HitRecord *hits) {
-  for (const HostLevel &level : levels) smooth(level.frame, level.field, tile, hits);
-}
-
 template <auto kTraceRay, auto kSide>
 inline uint trace_rays_of_levels(std::span<const HostLevel> levels, const RayTile &tile,
-                                 bool is_smooth, HitRecord *hits) {
+                                 HitRecord *hits) {
   uint num_hits = 0;
   for (uint y = tile.begin_y; y < tile.end_y; ++y) {
     for (uint x = tile.begin_x; x < tile.end_x; ++x) {
@@ -113,7 +109,6 @@ inline uint trace_rays_of_levels(std::span<const HostLevel> levels, const RayTil
       num_hits += trace_bands<kTraceRay, kSide>(levels, ray_id, hits + ray_id);
     }
   }
-  if (is_smooth && num_hits != 0) smooth_levels(levels, tile, hits);
   return num_hits;
 }
 
@@ -167,8 +162,7 @@ inline void end_band(const HostLevel &level, RayPacket &packet) {
 
 /// trace_rays_of_levels() in packets.
 template <auto kTraceBand, auto kSide>
-inline uint trace_levels(std::span<const HostLevel> levels, const RayTile &tile, bool is_smooth,
-                         HitRecord *hits) {
+inline uint trace_levels(std::span<const HostLevel> levels, const RayTile &tile, HitRecord *hits) {
   uint num_hits = 0;
   for (uint y = tile.begin_y; y < tile.end_y; y += 2) {
     for (uint x = tile.begin_x; x < tile.end_x; x += 4) {
@@ -184,7 +178,6 @@ inline uint trace_levels(std::span<const HostLevel> levels, const RayTile &tile,
       }
     }
   }
-  if (is_smooth && num_hits != 0) smooth_levels(levels, tile, hits);
   return num_hits;
 }
 #endif

@@ -101,6 +101,15 @@ ISO_OF_ITS_OWN ISO_WIDE_LOOP uint side_wide(const HostLevel &level, const Ray &r
 }
 #endif
 
+/// Gives hits of levels smooth gradients, if asked for. Returns num_hits.
+template <auto kSmooth>
+inline uint smoothed(uint num_hits, std::span<const HostLevel> levels, const RayTile &tile,
+                     bool is_smooth, HitRecord *hits) {
+  if (!is_smooth || num_hits == 0) return num_hits;
+  for (const HostLevel &level : levels) kSmooth(level, tile, hits);
+  return num_hits;
+}
+
 template <auto kTraceRay>
 inline void cast(const FrameParams &frame, const HostField &field, const IndexRay *rays,
                  uint num_rays, bool is_smooth, HitRecord *hits) {
@@ -157,10 +166,16 @@ ISO_WHOLE_LOOP void ranges_anywhere(const EncodedBlock &block, BlockRange *parts
 ISO_WHOLE_LOOP ulong inside_anywhere(const float *values, float isovalue) {
   return inside(values, isovalue);
 }
+ISO_OF_ITS_OWN ISO_WHOLE_LOOP void smooth_anywhere(const HostLevel &level, const RayTile &tile,
+                                                   HitRecord *hits) {
+  smooth(level.frame, level.field, tile, hits);
+}
 ISO_OF_ITS_OWN ISO_WHOLE_LOOP uint trace_rays_of_levels_anywhere(std::span<const HostLevel> levels,
                                                                  const RayTile &tile,
                                                                  bool is_smooth, HitRecord *hits) {
-  return trace_rays_of_levels<trace_ray_anywhere, side_anywhere>(levels, tile, is_smooth, hits);
+  return smoothed<smooth_anywhere>(
+      trace_rays_of_levels<trace_ray_anywhere, side_anywhere>(levels, tile, hits), levels, tile,
+      is_smooth, hits);
 }
 ISO_WHOLE_LOOP void cast_anywhere(const FrameParams &frame, const HostField &field,
                                   const IndexRay *rays, uint num_rays, bool is_smooth,
@@ -204,20 +219,26 @@ ISO_WIDE_LOOP ulong inside_wide(const float *values, float isovalue) {
   }
   return bits;
 }
-ISO_WIDE_LOOP uint trace_wide(const FrameParams &frame, const HostField &field, const RayTile &tile,
-                              bool is_smooth, HitRecord *hits) {
-  const uint num_hits = trace_packets(frame, field, tile, hits);
-  if (is_smooth && num_hits > 0) smooth(frame, field, tile, hits);
-  return num_hits;
+ISO_OF_ITS_OWN ISO_WIDE_LOOP void smooth_wide(const HostLevel &level, const RayTile &tile,
+                                              HitRecord *hits) {
+  smooth(level.frame, level.field, tile, hits);
+}
+uint trace_wide(const FrameParams &frame, const HostField &field, const RayTile &tile,
+                bool is_smooth, HitRecord *hits) {
+  const HostLevel level{frame, field};
+  return smoothed<smooth_wide>(trace_packets(frame, field, tile, hits), {&level, 1}, tile,
+                               is_smooth, hits);
 }
 ISO_WIDE_LOOP uint trace_levels_wide(std::span<const HostLevel> levels, const RayTile &tile,
                                      bool is_smooth, HitRecord *hits) {
-  return trace_levels<trace_band_packet, side_wide>(levels, tile, is_smooth, hits);
+  return smoothed<smooth_wide>(trace_levels<trace_band_packet, side_wide>(levels, tile, hits),
+                               levels, tile, is_smooth, hits);
 }
 ISO_OF_ITS_OWN ISO_WIDE_LOOP uint trace_rays_of_levels_wide(std::span<const HostLevel> levels,
                                                             const RayTile &tile, bool is_smooth,
                                                             HitRecord *hits) {
-  return trace_rays_of_levels<trace_ray_wide, side_wide>(levels, tile, is_smooth, hits);
+  return smoothed<smooth_wide>(trace_rays_of_levels<trace_ray_wide, side_wide>(levels, tile, hits),
+                               levels, tile, is_smooth, hits);
 }
 ISO_WIDE_LOOP void cast_wide(const FrameParams &frame, const HostField &field, const IndexRay *rays,
                              uint num_rays, bool is_smooth, HitRecord *hits) {
@@ -236,14 +257,15 @@ ISO_WIDE_LOOP void shade_wide(const FrameParams &frame, const ShadeParams &param
 
 uint trace_sse4(const FrameParams &frame, const HostField &field, const RayTile &tile,
                 bool is_smooth, HitRecord *hits) {
-  const uint num_hits = trace_packets_sse4(frame, field, tile, hits);
-  if (is_smooth && num_hits > 0) smooth(frame, field, tile, hits);
-  return num_hits;
+  const HostLevel level{frame, field};
+  return smoothed<smooth_anywhere>(trace_packets_sse4(frame, field, tile, hits), {&level, 1}, tile,
+                                   is_smooth, hits);
 }
-
-ISO_WHOLE_LOOP uint trace_levels_sse4(std::span<const HostLevel> levels, const RayTile &tile,
-                                      bool is_smooth, HitRecord *hits) {
-  return trace_levels<trace_band_packet_sse4, side_anywhere>(levels, tile, is_smooth, hits);
+uint trace_levels_sse4(std::span<const HostLevel> levels, const RayTile &tile, bool is_smooth,
+                       HitRecord *hits) {
+  return smoothed<smooth_anywhere>(
+      trace_levels<trace_band_packet_sse4, side_anywhere>(levels, tile, hits), levels, tile,
+      is_smooth, hits);
 }
 
 /// With fused multiply-add, single rays are faster.

@@ -86,9 +86,10 @@ inline void make_packet_rays(const FrameParams &frame, Ints column, Ints row, Pa
 }
 
 /// Traces a packet's rays (column, row) of the frame in the given lanes, in the band of the frame's
-/// level. Returns the lanes that hit something.
-inline Mask trace_packet(const PacketScene &scene, Ints column, Ints row, Mask lanes,
-                         HitRecord *hits, Packet *p) {
+/// level. Returns the lanes that hit something. A function of its own, since it is long.
+__attribute__((flatten, noinline)) inline Mask trace_packet(const PacketScene &scene, Ints column,
+                                                            Ints row, Mask lanes, HitRecord *hits,
+                                                            Packet *p) {
   const Mask enters = enter_box(&p->rays, &scene) & lanes;
   if (!any(enters)) return enters;
   open_packet(p, &scene);
