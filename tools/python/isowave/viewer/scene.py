@@ -35,7 +35,10 @@ from .turns import Client, Frame, Post, Stage, Turns
 
 PASS_SECONDS: Final = 0.06  # between pictures of passes
 SENDING_SHARE: Final = 4  # passes get so many times the time that their pictures take
-SETTLE_SECONDS: Final = 0.1  # after a first picture, for the next wish to come before the whole
+PAUSE_SECONDS: Final = (
+    0.03  # after a first picture, for a drag's next wish to come before the whole
+)
+SETTLE_SECONDS: Final = 0.1  # the same if the whole picture takes longer than that
 REST_SECONDS: Final = 0.12  # without a wish, until the lossless picture
 CERTAIN_SECONDS: Final = 0.4  # after the lossless picture, until its bounds are looked for
 SHOW_SECONDS: Final = 0.15  # without a picture, until what a cancelled one has is shown
@@ -308,9 +311,10 @@ class Scene:
             now = self._clock()
             client.offer(head, data, now, keep=True)
             if stage is Stage.FIRST:
-                # A pass of a whole picture may be long: not while the next wish is on its way.
-                settles = client.whole_seconds > SETTLE_SECONDS
-                client.stage, client.due = Stage.WHOLE, now + (SETTLE_SECONDS if settles else 0)
+                # Not while the next wish is on its way: it would wait for a pass to end.
+                is_long = client.whole_seconds > SETTLE_SECONDS
+                wait = SETTLE_SECONDS if is_long else PAUSE_SECONDS
+                client.stage, client.due = Stage.WHOLE, now + wait
             else:
                 client.stage, client.due = Stage.LOSSLESS, now + REST_SECONDS
                 client.lossless, client.whole_seconds = (head, rgb), now - frame.began
