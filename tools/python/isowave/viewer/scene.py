@@ -35,9 +35,7 @@ from .turns import Client, Frame, Post, Stage, Turns
 
 PASS_SECONDS: Final = 0.06  # between pictures of passes
 SENDING_SHARE: Final = 4  # passes get so many times the time that their pictures take
-PAUSE_SECONDS: Final = (
-    0.03  # after a first picture, for a drag's next wish to come before the whole
-)
+PAUSE_SECONDS: Final = 0.03  # from a first picture to the whole one: a drag's next wish comes first
 SETTLE_SECONDS: Final = 0.1  # the same if the whole picture takes longer than that
 REST_SECONDS: Final = 0.12  # without a wish, until the lossless picture
 CERTAIN_SECONDS: Final = 0.4  # after the lossless picture, until its bounds are looked for
