@@ -73,14 +73,15 @@ void march_given(benchmark::State &state) {
       [&] { in.march_given(in.macrocells, in.cache, in.rays); });
 }
 
-constexpr std::int64_t kEdge = 256;
+const CompressedVolume &layer_of_two_levels() {
+  return mixing_layer(256, 4, 2);
+}
 
 RendererOptions options_of_levels(std::int64_t width, ocl::Device &device) {
-  return checked(
-      {.size = image_of_width(width),
-       .cache_slots = static_cast<std::uint32_t>(mixing_layer_of_levels(kEdge).block_count()),
-       .with_levels = true},
-      mixing_layer_of_levels(kEdge), device);
+  return checked({.size = image_of_width(width),
+                  .cache_slots = static_cast<std::uint32_t>(layer_of_two_levels().block_count()),
+                  .with_levels = true},
+                 layer_of_two_levels(), device);
 }
 
 /// Levels of detail that begin before the point that the camera looks at.
@@ -93,8 +94,8 @@ std::ptrdiff_t num_levels_before(const std::vector<FrameParams> &frames, const C
 
 struct MarchLevelsInput {
   MarchLevelsInput(ocl::Device &device, std::int64_t width)
-      : blocks(device, mixing_layer_of_levels(kEdge), options_of_levels(width, device),
-               make_plan(device, mixing_layer_of_levels(kEdge), options_of_levels(width, device))),
+      : blocks(device, layer_of_two_levels(), options_of_levels(width, device),
+               make_plan(device, layer_of_two_levels(), options_of_levels(width, device))),
         rays(device, blocks.plan.limits.rays),
         start_rays(device, rays.num_rays, kGroupSize, true),
         march(device, rays.num_rays, kGroupSize, kDefaultSolver, true, RaySource::kCamera,

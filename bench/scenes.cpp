@@ -3,7 +3,7 @@
 #include <cmath>
 #include <map>
 #include <span>
-#include <utility>
+#include <tuple>
 
 #include "core/sources/generate.hpp"
 #include "core/zfp/zfp_accuracy.hpp"
@@ -32,26 +32,14 @@ class WavySlabReader : public VolumeReader {
 
 }  // namespace
 
-const CompressedVolume &mixing_layer(std::int64_t edge, std::int64_t rate) {
-  static std::map<std::pair<std::int64_t, std::int64_t>, CompressedVolume> volumes;
-  CompressedVolume &volume = volumes[{edge, rate}];
+const CompressedVolume &mixing_layer(std::int64_t edge, std::int64_t rate, std::uint32_t levels) {
+  static std::map<std::tuple<std::int64_t, std::int64_t, std::uint32_t>, CompressedVolume> volumes;
+  CompressedVolume &volume = volumes[{edge, rate, levels}];
   if (volume.words.empty()) {
     GenerateOptions generate;
     generate.dims = glm::uvec3(static_cast<std::uint32_t>(edge));
-    CompressOptions options;
-    options.rate = static_cast<std::uint32_t>(rate);
-    volume = compress(*open_generated(generate), options);
-  }
-  return volume;
-}
-
-const CompressedVolume &mixing_layer_of_levels(std::int64_t edge) {
-  static std::map<std::int64_t, CompressedVolume> volumes;
-  CompressedVolume &volume = volumes[edge];
-  if (volume.words.empty()) {
-    GenerateOptions generate;
-    generate.dims = glm::uvec3(static_cast<std::uint32_t>(edge));
-    volume = compress(*open_generated(generate), {.rate = 4, .levels = 2});
+    volume = compress(*open_generated(generate),
+                      {.rate = static_cast<std::uint32_t>(rate), .levels = levels});
   }
   return volume;
 }

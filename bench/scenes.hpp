@@ -8,13 +8,12 @@
 
 namespace isowave::core::bench {
 
-/// mixing_layer in an edge^3 cube, compressed at `rate` bits per voxel; its surface is at 0.5. Kept
-/// for the rest of the run.
-const CompressedVolume &mixing_layer(std::int64_t edge, std::int64_t rate = 4);
+/// mixing_layer in an edge^3 cube, compressed at `rate` bits per voxel, with so many levels of
+/// detail; its surface is at 0.5. Kept for the rest of the run.
+const CompressedVolume &mixing_layer(std::int64_t edge, std::int64_t rate = 4,
+                                     std::uint32_t levels = 1);
 inline constexpr float kMixingLayerIsovalue = 0.5f;
 
-/// mixing_layer(edge, 4) with a coarser level of detail.
-const CompressedVolume &mixing_layer_of_levels(std::int64_t edge);
 /// The same as voxels of uint8, without a loss: blocks have lengths of their own.
 const CompressedVolume &exact_mixing_layer(std::int64_t edge);
 

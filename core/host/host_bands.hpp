@@ -12,18 +12,6 @@
 
 namespace isowave::core {
 
-/// The side on which a whole block is; unknown if it may have cells that change.
-inline uint side_of_block(const FrameParams &frame, const HostField &field, BlockCoords b) {
-  constexpr uint kBlocks = ISO_MACROCELL_BLOCKS;
-  const uint columns = (frame.grid.blocks_x + 3) / 4, rows = (frame.grid.blocks_y + 3) / 4;
-  const ulong macrocell =
-      b.x / kBlocks + columns * (b.y / kBlocks + static_cast<ulong>(rows) * (b.z / kBlocks));
-  const uint bit = b.x % kBlocks + 4 * (b.y % kBlocks) + 16 * (b.z % kBlocks);
-  if (field.has_gaps || (field.masks[macrocell] >> bit & 1u) != 0) return ISO_SIDE_UNKNOWN;
-  return field.highs[64 * macrocell + bit] - frame.surface.isovalue >= 0.0f ? ISO_SIDE_INSIDE
-                                                                            : ISO_SIDE_OUTSIDE;
-}
-
 /// Decodes a cell.
 inline void open_cell(const HostLevel &level, BlockCoords cell, float *w) {
   level.field.open(level_block_at(&level.frame, cell.x >> 2, cell.y >> 2, cell.z >> 2));

@@ -11,6 +11,7 @@
 
 #include "core/view/given_rays.hpp"
 #include "kernels_cl/portable/ambient.h"
+#include "kernels_cl/portable/ray_state.h"
 #include "kernels_cl/portable/shade.h"
 
 namespace isowave::core {
@@ -78,6 +79,18 @@ struct HostLevel {
   FrameParams frame;  ///< its surface's box is that of the field's active blocks
   HostField field;
 };
+
+/// The side on which a whole block is; unknown if it may have cells that change.
+inline uint side_of_block(const FrameParams &frame, const HostField &field, BlockCoords b) {
+  constexpr uint kBlocks = ISO_MACROCELL_BLOCKS;
+  const uint columns = (frame.grid.blocks_x + 3) / 4, rows = (frame.grid.blocks_y + 3) / 4;
+  const ulong macrocell =
+      b.x / kBlocks + columns * (b.y / kBlocks + static_cast<ulong>(rows) * (b.z / kBlocks));
+  const uint bit = b.x % kBlocks + 4 * (b.y % kBlocks) + 16 * (b.z % kBlocks);
+  if (field.has_gaps || (field.masks[macrocell] >> bit & 1u) != 0) return ISO_SIDE_UNKNOWN;
+  return field.highs[64 * macrocell + bit] - frame.surface.isovalue >= 0.0f ? ISO_SIDE_INSIDE
+                                                                            : ISO_SIDE_OUTSIDE;
+}
 
 struct RayTile {
   uint begin_x, begin_y, end_x, end_y;  ///< of the frame's rays

@@ -128,10 +128,13 @@ void HostRenderer::draw_bands(const FrameRequest &request, std::span<const HostL
         }
         const RayTile part = within(tile, first.frame.screen);
         const HostLoops &loops = host_loops();
-        num_hits += drawing.size() == 1 && !is_alone
-                        ? loops.trace(first.frame, first.field, part, is_smooth, hits_.data())
-                        : (is_alone ? loops.trace_rays_of_levels : loops.trace_levels)(
-                              drawing, part, is_smooth, hits_.data());
+        if (is_alone) {
+          num_hits += loops.trace_rays_of_levels(drawing, part, is_smooth, hits_.data());
+        } else if (drawing.size() == 1) {
+          num_hits += loops.trace(first.frame, first.field, part, is_smooth, hits_.data());
+        } else {
+          num_hits += loops.trace_levels(drawing, part, is_smooth, hits_.data());
+        }
       },
       [&](std::uint32_t rows) {
         PassStats pass;

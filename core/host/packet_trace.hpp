@@ -152,47 +152,38 @@ inline void find_sides(const HostLevel &level, const PacketScene &scene, const P
                        float t, Mask lanes, uchar *sides) {
   const FrameParams &frame = level.frame;
   const HostField &field = level.field;
-  const float isovalue = frame.surface.isovalue;
   const CellsAtBorder cells = cells_at_border(scene, rays, t);
-  const auto side_of = [](bool is_inside) {
-    return static_cast<uchar>(is_inside ? ISO_SIDE_INSIDE : ISO_SIDE_OUTSIDE);
-  };
+  const Mask is_outside = cells.block_certain & ~cells.within;
   for (int lane = 0; lane < 8; ++lane)
-    sides[lane] = cells.block_certain[lane] != 0 && cells.within[lane] == 0
-                      ? uchar{ISO_SIDE_UNKNOWN}
-                      : kSideNotCertain;
+    sides[lane] = is_outside[lane] != 0 ? uchar{ISO_SIDE_UNKNOWN} : kSideNotCertain;
+  const auto block_of = [&](unsigned lane) {
+    return BlockCoords{static_cast<uint>(cells.at[0][lane] >> 2),
+                       static_cast<uint>(cells.at[1][lane] >> 2),
+                       static_cast<uint>(cells.at[2][lane] >> 2)};
+  };
   const Mask in_blocks = lanes & cells.within & cells.block_certain;
-  if (field.has_gaps || !any(in_blocks)) return;
-  const Ints blocks[3] = {cells.at[0] >> 2, cells.at[1] >> 2, cells.at[2] >> 2};
-  const Ints macrocells = (blocks[0] >> 2) +
-                          scene.columns * ((blocks[1] >> 2) + scene.rows * (blocks[2] >> 2)),
-             places = (blocks[0] & 3) + 4 * (blocks[1] & 3) + 16 * (blocks[2] & 3);
   Mask in_active = ints(0);
   ISO_EACH_LANE(lane, in_blocks) {
-    const auto macrocell = static_cast<std::size_t>(macrocells[lane]);
-    const int place = places[lane];
-    if ((field.masks[macrocell] >> place & 1u) != 0) {
+    const uint side = side_of_block(frame, field, block_of(lane));
+    if (side == ISO_SIDE_UNKNOWN) {
       in_active[lane] = -1;
     } else {
-      const std::size_t block = 64 * macrocell + static_cast<std::size_t>(place);
-      sides[lane] = side_of(field.highs[block] - isovalue >= 0.0f);
+      sides[lane] = static_cast<uchar>(side);
     }
   }
   in_active &= cells.is_certain;
-  if (!any(in_active)) return;
+  if (field.has_gaps || !any(in_active)) return;
+  const Ints blocks[3] = {cells.at[0] >> 2, cells.at[1] >> 2, cells.at[2] >> 2};
   Ints low = ints(0), high = ints(0);
   open_blocks(&field, &frame, blocks, in_active, &low, &high);
-  const Ints cell = (cells.at[0] & 3) + 4 * (cells.at[1] & 3) + 16 * (cells.at[2] & 3);
-  ISO_EACH_LANE(lane, in_active) {
-    const int number = cell[lane];
-    if ((pick(cell < 32, low, high)[lane] >> (number & 31) & 1) != 0) continue;
-    const uint block =
-        level_block_at(&frame, static_cast<uint>(blocks[0][lane]),
-                       static_cast<uint>(blocks[1][lane]), static_cast<uint>(blocks[2][lane]));
-    sides[lane] = side_of(
-        field.values[std::size_t{ISO_BLOCK_VOXELS} * block + static_cast<std::size_t>(number)] -
-            isovalue >=
-        0.0f);
+  const Ints numbers = (cells.at[0] & 3) + 4 * (cells.at[1] & 3) + 16 * (cells.at[2] & 3),
+             changing = pick(numbers < 32, low, high) >> (numbers & 31) & 1;
+  ISO_EACH_LANE(lane, in_active & (changing == 0)) {
+    const BlockCoords b = block_of(lane);
+    const std::size_t block = level_block_at(&frame, b.x, b.y, b.z);
+    const float voxel =
+        field.values[ISO_BLOCK_VOXELS * block + static_cast<std::size_t>(numbers[lane])];
+    sides[lane] = voxel - frame.surface.isovalue >= 0.0f ? ISO_SIDE_INSIDE : ISO_SIDE_OUTSIDE;
   }
 }
 

@@ -45,8 +45,8 @@ struct RendererOptions {
   std::vector<float> range_thresholds{};
 };
 
-/// Without a budget, a cache grows to so many slots at most: 325 MiB of float32, with their share
-/// of the tables. A cold 720p frame of a 1024^3 volume touches about 400,000 blocks.
+/// The most slots of a cache without a budget. They take 325 MiB of float32, with their share of
+/// the tables. A cold 720p frame of a 1024^3 volume touches about 400,000 blocks.
 inline constexpr std::uint32_t kAmpleCacheSlots = 1u << 20;
 
 /// The options with their defaults filled in, except those that the memory plan decides. Throws

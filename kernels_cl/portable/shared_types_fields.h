@@ -27,13 +27,15 @@
   X(schedule.scanned_pairs)
 #define ISO_PAIR_HIT_FIELDS(X) X(cell) X(s)
 #define ISO_BLOCK_RAYS_FIELDS(X) X(begin) X(end)
-#define ISO_HIT_RECORD_FIELDS(X) X(t) X(block_id) X(cell) X(x) X(y) X(z) X(grad_x) X(grad_y) X(grad_z)
+#define ISO_HIT_RECORD_FIELDS(X) \
+  X(t) X(block_id) X(cell) X(x) X(y) X(z) X(grad_x) X(grad_y) X(grad_z)
 #define ISO_GIVEN_RAY_FIELDS(X) X(o_x) X(o_y) X(o_z) X(d_x) X(d_y) X(d_z) X(level)
 #define ISO_STREAM_LAYOUT_FIELDS(X) X(bits_per_block) X(words_per_part) X(min_exponent) \
-  X(least) X(greatest) X(value_offset) X(bound_unit) X(bounds_begin) X(bounds_by_place) X(no_data_begin)
+  X(least) X(greatest) X(value_offset) X(bound_unit) X(bounds_begin) X(bounds_by_place) \
+  X(no_data_begin)
 #define ISO_PASS_COUNTS_FIELDS(X)                                           \
-  X(ray_count) X(pass) X(frame_pass) X(last_frame_pass) X(active_count) X(spec_count) X(window_count)      \
-  X(pair_slot_count) X(pair_count) X(ahead_count)                           \
+  X(ray_count) X(pass) X(frame_pass) X(last_frame_pass) X(active_count) X(spec_count)      \
+  X(window_count) X(pair_slot_count) X(pair_count) X(ahead_count)                           \
   X(granted_count) X(visible_count) X(requested_count) X(decoded_count)     \
   X(recycled_count) X(hit_count) X(next_active_count) X(free_count)
 

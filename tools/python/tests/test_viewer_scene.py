@@ -72,6 +72,32 @@ def test_whole_pictures_wait_for_wishes_that_are_on_their_way() -> None:
     assert volume.frames[-1].size == (64, 48)
 
 
+def test_whole_pictures_that_are_short_wait_for_a_drags_next_wish() -> None:
+    clock, volume = Clock(), FakeVolume()
+
+    def before_pass(drawn: Drawn) -> None:
+        clock.now += 0.01 if drawn.size == (16, 12) else 0.025
+
+    volume.before_pass = before_pass
+    scene = make_scene(volume, clock)
+    eye = Eye(scene)
+    eye.wish()
+    run(scene)
+    eye.ack()
+    assert 0.02 < eye.client.whole_seconds < 0.1
+    drawn = len(volume.frames)
+    for i in range(5):
+        eye.wish(80.0 + i)
+        while scene.step():
+            pass
+        eye.ack()
+        clock.now += 0.02
+    assert [f.size for f in volume.frames[drawn:]] == [(16, 12)] * 5
+    clock.now += 0.02
+    assert scene.step()
+    assert volume.frames[-1].size == (64, 48)
+
+
 def test_the_last_picture_is_lossless_to_the_bit() -> None:
     clock, volume = Clock(), FakeVolume()
     scene = make_scene(volume, clock)
