@@ -2,7 +2,6 @@
 
 #include <chrono>
 #include <cstring>
-#include <glm/gtc/quaternion.hpp>
 
 #include "core/base/error.hpp"
 #include "core/base/ms_since.hpp"
@@ -27,10 +26,8 @@ std::vector<double> all_times(const std::vector<ViewTimes> &views, FramesOfView 
   return times;
 }
 
-Camera turned(Camera camera) {
-  const glm::dquat turn = glm::angleAxis(glm::radians(1.0), glm::normalize(camera.up));
-  camera.eye = camera.at + turn * (camera.eye - camera.at);
-  return camera;
+Camera turned(const Camera &camera) {
+  return core::turned(camera, 1);
 }
 
 std::vector<ViewTimes> measure_views(DeviceRenderer &renderer, const std::vector<Camera> &cameras,

@@ -33,7 +33,7 @@ std::vector<double> all_times(const std::vector<ViewTimes> &views, FramesOfView 
                               double (*ms)(const TimedFrame &));
 
 /// The camera one degree further around the vertical through the point it looks at.
-Camera turned(Camera camera);
+Camera turned(const Camera &camera);
 
 /// request: its camera does not matter. The renderer must have drawn a frame of the isovalue
 /// before: a driver may compile a kernel when it first runs, and an isovalue's first frame finds

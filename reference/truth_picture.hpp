@@ -12,12 +12,17 @@
 
 namespace isowave::core {
 
+enum class Sky {
+  kOpen,  ///< light from the sky reaches every hit
+  kSeen   ///< each ray's hit looks at the sky in one direction: pictures with ambient rays
+};
+
 /// Draws with all threads.
 ///
 /// info      the grid of the oracle's voxels
 /// size      size.samples: rays of a pixel along each axis, in the middles of as many equal parts
 /// Returns   RGB; a pixel's colour is the mean of its rays' display values
 Image8 truth_picture(const GridOracle &oracle, const VolumeInfo &info, const Camera &camera,
-                     ImageSize size, const Appearance &appearance = {});
+                     ImageSize size, Sky sky = Sky::kOpen, const Appearance &appearance = {});
 
 }  // namespace isowave::core

@@ -43,42 +43,62 @@ for bad in "$work/none.raw:1" "$top/tests/data/fuel_64x33x32_uint8.raw.gz" "$wor
   [ "$(wc -l <"$work/error")" -eq 1 ] || fail "$bad: $(cat "$work/error")"
 done
 
-"$program" bench pareto generate:sphere_96x96x96_uint8 -i 128 --size 48x32 --views 1 --rounds 1 \
-  --storage rate:2,tolerance:2,exact --pipeline rays --solver bernstein \
-  --voxel-pixels 0,2 --voxel-error 0,0.1 --max-surface-error 0.1,20 \
-  --json "$work/all.json" >"$work/out"
+"$program" bench pareto generate:sphere_64x64x64_uint8 -i 128 --size 48x32 --views 1 --rounds 1 \
+  --pictures "$work/pictures" --json "$work/all.json" >"$work/out"
 "$top/tools/charts" "$work/all.json" -o "$work"
-for file in all_pareto.png all_pareto.svg; do
+for file in all_pareto{,_new,_wrong,_bytes}.{png,svg} pictures/pareto_{truth_0,BCMC}_0.png; do
   [ -s "$work/$file" ] || fail "$file is missing"
 done
-/usr/bin/python3 - "$work/all.json" <<'EOF'
+PYTHONPATH=$top/tools /usr/bin/python3 - "$work/all.json" <<'EOF'
 import json, sys
-points = json.load(open(sys.argv[1]))["points"]
-chosen = [p for p in points if p["max_surface_error"] is not None]
-points = [p for p in points if p["max_surface_error"] is None]
-assert len(points) == 12, len(points)
-assert len(chosen) == 6, "two errors of three ways to store it"
-assert all(p["over_front"] is None or p["over_front"] > 0 for p in chosen), chosen
-exact = [p for p in chosen if p["storage"] == "exact"]
-assert any(p["over_front"] for p in exact), "the best point is among the swept"
-def left_out(error):
-    points = [p for p in chosen if p["max_surface_error"] == error]
-    return sum(c["voxel_pixels"] for p in points for c in p["chosen"])
-small, large = left_out(0.1), left_out(20)
-assert small < large, "more may be left out where more error is allowed"
-exact = [p for p in points if p["storage"] == "exact"]
-best = [p for p in exact if p["voxel_pixels"] == p["voxel_error"] == 0]
-assert len(best) == 1, best
-best = best[0]
-assert best["wrong_pixels"] == best["depth_p99"] == best["flip"] == 0, best
-assert best["psnr_db"] is None, best
-others = [p for p in points if p is not best]
-assert all(p["psnr_db"] is not None and p["flip"] > 0 for p in others), "they have errors"
-assert len({p["bytes"] for p in points}) == 6, "three ways to store it, without and with levels"
-assert min(p["decoded_blocks"] for p in exact if p["voxel_pixels"]) < best["decoded_blocks"]
+from measuring.fronts import front_of
+points = {point["way"]: point for point in json.load(open(sys.argv[1]))["points"]}
+one, many = points["default"], points["--samples 8"]
+assert 0 < many["flip"] < 0.3 * one["flip"], "more rays come closer to the truth"
+assert points["--samples 2"]["wrong_pixels"] <= one["wrong_pixels"]
+assert points["1/8 size"]["flip"] > points["1/2 size"]["flip"] > one["flip"]
+same = ("flip", "wrong_pixels")
+for way in ("--device host", "--pipeline blocks"):
+    assert [points[way][name] for name in same] == [one[name] for name in same], way
+assert points["--rate 2"]["stored_bytes"] == 64**3 / 4
+assert points["--voxel-pixels 1"]["stored_bytes"] > one["stored_bytes"], "levels are stored"
+assert all(point["cold_ms"] > 0 < point["next_ms"] for point in points.values())
+front = front_of(points.values(), "next_ms", "flip")
+for a, b in zip(front, front[1:]):
+    assert a["next_ms"] <= b["next_ms"] and a["flip"] > b["flip"]
+for point in points.values():
+    best = min(p["flip"] for p in front if p["next_ms"] <= point["next_ms"])
+    assert 0.95 * best <= point["flip"], point
 EOF
+# What another program drew: here, the truth itself, and the same of another view.
+peers() { # SIZE NAME
+  echo "{\"pareto_peers\": [{\"name\": \"peer\", \"ms\": {\"next\": 3}, \"isovalue\": 128,
+    \"size\": $1, \"bytes\": 5, \"pictures\": [\"$2\"]}]}" >"$work/peers.json"
+}
+judge() {
+  "$program" bench pareto generate:sphere_64x64x64_uint8 -i 128 --size 48x32 --views 1 --rounds 1 \
+    --ways default --peers "$work/peers.json" --json "$work/peer.json"
+}
+peers '[48, 32]' pictures/pareto_truth_0_0.png
+judge >"$work/out"
+/usr/bin/python3 - "$work/peer.json" <<'EOF'
+import json, sys
+peer = [point for point in json.load(open(sys.argv[1]))["points"] if point["is_peer"]]
+assert len(peer) == 1 and peer[0]["flip"] == peer[0]["wrong_pixels"] == 0, peer
+assert (peer[0]["next_ms"], peer[0]["cold_ms"], peer[0]["memory_bytes"]) == (3, None, 5), peer
+EOF
+"$top/tools/charts" "$work/peer.json" -o "$work"
+peers '[48, 33]' pictures/pareto_truth_0_0.png
+if judge 2>"$work/error" >"$work/out"; then fail "a peer's picture of another size was accepted"; fi
+[ "$(wc -l <"$work/error")" -eq 1 ] || fail "another size: $(cat "$work/error")"
+peers '[48, 32]' none.png
+if judge 2>"$work/error" >"$work/out"; then fail "a peer without pictures was accepted"; fi
+[ "$(wc -l <"$work/error")" -eq 1 ] || fail "no picture: $(cat "$work/error")"
+echo '{}' >"$work/peers.json"
+if judge 2>"$work/error" >"$work/out"; then fail "peers that are none were accepted"; fi
+[ "$(wc -l <"$work/error")" -eq 1 ] || fail "no peers: $(cat "$work/error")"
 fuel=$top/tests/data/fuel_64x33x32_uint8.raw.gz
-for bad in "--storage rate" "--storage full:3" "--voxel-pixels -1" "--max-surface-error -1"; do
+for bad in "--ways full" "--ways default,,BCMC" "--size 0x3" "--views 0"; do
   # shellcheck disable=SC2086
   if "$program" bench pareto "$fuel" -i 40 $bad 2>"$work/error" >/dev/null; then
     fail "$bad was accepted"

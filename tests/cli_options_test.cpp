@@ -65,7 +65,7 @@ TEST(CliOptions, EmptyValuesAreRefused) {
   expect_one_line_error("render '' -i 80", "VOLUME: the value is empty");
   expect_one_line_error(kRender + "--depth= --stats x", "--depth: the value is empty");
   expect_one_line_error(kRender + "-o --depth x", "a value is missing before --depth");
-  expect_one_line_error("bench pareto " + kHead + " -i 80 --storage exact,,rate:2", "is empty");
+  expect_one_line_error("bench pareto " + kHead + " -i 80 --ways default,,BCMC", "is empty");
   expect_one_line_error("compare '' ''", "the value is empty");
 }
 
@@ -95,8 +95,7 @@ TEST(CliOptions, NumbersAreDecimalFiniteAndInRange) {
   expect_one_line_error("verify --rays 0", "--rays");
   expect_one_line_error("verify --watertight 0", "--watertight");
   expect_one_line_error("convert " + kHead + " --map-nan 1e39 -o a.zfp", "--map-nan");
-  expect_one_line_error("bench pareto " + kHead + " -i 80 --storage rate:-1", "--storage");
-  expect_one_line_error("bench pareto " + kHead + " -i 80 --storage tolerance:nan", "--storage");
+  expect_one_line_error("bench pareto " + kHead + " -i 80 --ways rate", "--ways");
   expect_one_line_error("bench solvers " + kHead + ":1e39", "VOLUME:ISOVALUE");
   const TemporaryFolder folder;
   ASSERT_EQ(run_isowave("generate sphere --dims 010 -o " + quoted(folder.path())).status, 0);

@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "core/base/error.hpp"
+#include "core/stages/march_packets.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/test_pipelines.hpp"
 
@@ -244,7 +245,10 @@ TEST_P(TimeBudgetOnDevice, TimeIsLeftForArrays) {
   SlowFetch slow(renderer_, now, fetch_ms);
   TimedRenderer frames(slow, [&now] { return now += 1; });
   FrameRequest request{camera_, kIsovalue};
-  const auto num_steps = [&] { return frames.render(within_ms(1e6, request)).steps.size(); };
+  const auto num_steps = [&] {
+    request.isovalue = request.isovalue == kIsovalue ? 0.41f : kIsovalue;  // begins anew
+    return frames.render(within_ms(1e6, request)).steps.size();
+  };
   EXPECT_EQ(num_steps(), 2u);
   frames.fetch({.depth = true}, {});
   EXPECT_EQ(num_steps(), 1u) << "no time is left for a second one";
@@ -297,7 +301,28 @@ TEST_P(TimeBudgetOnDevice, NoTimeIsRefused) {
   EXPECT_THROW(plain.keep_picture(), Error);
 }
 
-/// Coarse levels draw small pictures, the finest the full one.
+/// The first picture of an isovalue is the smallest; later frames begin with what has time twice.
+TEST_P(TimeBudgetOnDevice, FurtherFramesBeginWithTheLargestPictureThatHadTime) {
+  const FrameRequest request{camera_, kIsovalue};
+  const auto sizes_within = [&](double budget_ms, float isovalue) {
+    FrameRequest other = request;
+    other.isovalue = isovalue;
+    std::vector<std::uint32_t> widths;
+    for (const auto &step : frames_.render(within_ms(budget_ms, other)).steps)
+      widths.push_back(step.size.width);
+    return widths;
+  };
+  const auto first = sizes_within(1e9, kIsovalue);
+  ASSERT_GT(first.size(), 1u);
+  EXPECT_EQ(first.front(), 4u);
+  EXPECT_EQ(first.back(), kSize.width);
+  EXPECT_EQ(sizes_within(1e9, kIsovalue), std::vector{kSize.width});
+  expect_same_hits(renderer_.hits(), picture_of(kSize), kSize.width);
+  EXPECT_EQ(sizes_within(1e9, 0.5f).front(), 4u) << "another isovalue";
+  EXPECT_EQ(sizes_within(1e-6, 0.5f), std::vector{4u}) << "hardly any time";
+}
+
+/// On a GPU, coarse levels draw small pictures; elsewhere, the levels of the whole picture do.
 TEST(TimeBudgetOnDevice, LevelsDrawWhatTheyAreFineEnoughFor) {
   const glm::uvec3 dims(40, 36, 44);
   ArrayReader reader(test::grid_info(dims), test::sample(dims, test::sphere_field(dims)));
@@ -308,10 +333,17 @@ TEST(TimeBudgetOnDevice, LevelsDrawWhatTheyAreFineEnoughFor) {
     DeviceRenderer renderer(device, volume,
                             {.size = kSize, .with_levels = true, .with_kept_picture = true});
     TimedRenderer frames(renderer);
-    const FrameStats coarse = frames.render(within_ms(1e-6, {camera, 0.5f}));
-    ASSERT_EQ(coarse.steps.size(), 1u);
-    EXPECT_EQ(coarse.steps[0].voxel_pixels, 1.0);
-    EXPECT_GT(coarse.first_level, 0u);
+    const bool pays = renderer.abilities().levels_pay;
+    EXPECT_EQ(pays, !MarchPackets::suits(info));
+    const FrameStats small = frames.render(within_ms(1e-6, {camera, 0.5f}));
+    ASSERT_EQ(small.steps.size(), 1u);
+    EXPECT_EQ(small.steps[0].voxel_pixels, pays ? 1.0 : 0.0);
+    EXPECT_EQ(small.first_level > 0, pays);
+    FrameRequest request{camera, 0.5f};
+    request.voxel_pixels = 16;
+    const FrameStats coarse = frames.render(within_ms(1e-6, request));
+    EXPECT_EQ(coarse.steps[0].voxel_pixels, 2.0) << "of the small picture's pixels";
+    EXPECT_GT(coarse.last_level, 0u);
     const FrameStats fine = frames.render(within_ms(1e9, {camera, 0.5f}));
     EXPECT_TRUE(fine.complete);
     EXPECT_EQ(fine.last_level, 0u);

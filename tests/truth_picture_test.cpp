@@ -68,7 +68,7 @@ TEST(TruthPicture, LightsAWallAsTheFormulaSays) {
   const GridOracle oracle(voxels, {17, 17, 17}, 8.0f);
   const Camera camera{{8, 8, 30}, {8, 8, 0}, {0, 1, 0}, 20};
   const Appearance look;
-  const Image8 image = truth_picture(oracle, info, camera, {9, 9, 4}, look);
+  const Image8 image = truth_picture(oracle, info, camera, {9, 9, 4}, Sky::kOpen, look);
   // In the middle, the wall faces the viewer, and slopes neither up nor down.
   const double light =
       double{look.ambient} + double{look.diffuse} + double{look.above} / std::sqrt(2.0);
@@ -92,7 +92,7 @@ TEST(TruthPicture, CountsTheShareOfAPixelThatIsCovered) {
   look.ambient = 1;
   look.diffuse = look.specular = look.above = 0;
   look.surface = glm::vec3(0);
-  const Image8 image = truth_picture(oracle, info, camera, {4, 1, 8}, look);
+  const Image8 image = truth_picture(oracle, info, camera, {4, 1, 8}, Sky::kOpen, look);
   // The wall ends at x = 4.99. The picture is 4 wide, from x = 2 to 6.
   EXPECT_EQ(image.pixels[0], 0);
   EXPECT_EQ(image.pixels[3], 0);
@@ -131,6 +131,28 @@ TEST(TruthPicture, IsThePictureOfManyRays) {
       EXPECT_GT(Flip(truth).error(renderer.shade()), 0.005) << "one ray a pixel has jagged edges";
     }
   }
+}
+
+TEST(TruthPicture, DarkensWhatSeesLittleOfTheSky) {
+  const VolumeInfo info = test::grid_info({33, 33, 33});
+  // A wall with a deep shaft, of which the picture shows the floor.
+  const auto voxels = sample(info.dims, [](const glm::dvec3 &p) {
+    const bool in_shaft = std::abs(p.x - 16) < 3.5 && std::abs(p.y - 16) < 3.5;
+    return p.z < (in_shaft ? 6 : 28) ? 100.0 : 0.0;
+  });
+  const TestVolume volume(info, voxels, {.tolerance = {}, .exact = true});
+  const GridOracle oracle(voxels, {33, 33, 33}, 50.0f);
+  const Camera camera{{16, 16, 60}, {16, 16, 0}, {0, 1, 0}, 8};
+  const ImageSize size{32, 32, 8};
+  const Image8 open = truth_picture(oracle, info, camera, size),
+               seen = truth_picture(oracle, info, camera, size, Sky::kSeen);
+  const std::size_t middle = 3 * (32 * 16 + 16);
+  EXPECT_LT(seen.pixels[middle], open.pixels[middle] - 40);
+  HostRenderer renderer(volume.compressed);
+  renderer.render({.camera = camera, .isovalue = 50, .size = size, .ambient_rays = 64});
+  const Image8 drawn = renderer.shade();
+  EXPECT_LT(Flip(seen).error(drawn), 0.02);
+  EXPECT_GT(Flip(open).error(drawn), 0.05);
 }
 
 }  // namespace

@@ -23,6 +23,7 @@ struct Abilities {
   ImageSize largest{};  ///< picture of a request without a size
   std::uint64_t most_rays = std::numeric_limits<std::uint64_t>::max();  ///< most rays of a frame
   bool levels = false;             ///< FrameRequest::voxel_pixels
+  bool levels_pay = false;         ///< coarse levels make frames faster on such a device
   bool fewer_planes = false;       ///< FrameRequest::voxel_error
   bool bounds = false;             ///< FrameRequest::bound
   bool given_rays = false;         ///< FrameRequest::ambient_rays, and cast_rays()

@@ -37,9 +37,11 @@ double TimedRenderer::steady_clock_ms() {
       .count();
 }
 
-void TimedRenderer::check_keeps_picture() const {
-  if (!inner().abilities().kept_picture)
+void TimedRenderer::set_up() {
+  const Abilities can = inner().abilities();
+  if (!can.kept_picture)
     throw Error("no frame can be drawn within a time: the renderer was made to keep no picture");
+  levels_pay_ = of_first(team(), std::vector{can.levels_pay ? 1.0 : 0.0}).front() != 0;
 }
 
 Abilities TimedRenderer::abilities() const {
@@ -60,7 +62,8 @@ FrameStats TimedRenderer::render(const FrameRequest &request) {
   const double fetch_ms = fetch_ms_;
   const double begin = now_ms(), end = begin + *request.time_budget_ms - fetch_ms;
   FrameStats sum;
-  std::size_t step = kNumSteps - 1;
+  std::size_t step = first_step(request.isovalue, end - begin);
+  isovalue_ = request.isovalue;
   for (double step_begin = begin;;) {
     const bool is_first = sum.steps.empty();
     Drawn drawn = draw_step(request, step, is_first, step_begin, end);
@@ -138,9 +141,22 @@ FrameRequest TimedRenderer::request_of(const FrameRequest &request, std::size_t 
   FrameRequest smaller = request;
   smaller.time_budget_ms.reset();
   smaller.size = halved(full, static_cast<unsigned>(step));
-  if (step != 0 && can.levels) smaller.voxel_pixels = std::max(1.0, request.voxel_pixels / scale);
-  if (step != 0) smaller.ambient_rays = 0;
+  if (step != 0) {
+    smaller.voxel_pixels = std::max(levels_pay_ ? 1.0 : 0.0, request.voxel_pixels / scale);
+    smaller.ambient_rays = 0;
+  }
   return smaller;
+}
+
+/// The step to begin with: a picture of another isovalue takes longer than the last, so the
+/// smallest.
+std::size_t TimedRenderer::first_step(float isovalue, double left_ms) const {
+  std::size_t step = kNumSteps - 1;
+  if (isovalue_ != isovalue) return step;
+  for (std::size_t finer = step; finer-- > 0;) {
+    if (last_ms_[finer] > 0 && last_ms_[finer] <= left_ms / 2) step = finer;
+  }
+  return step;
 }
 
 /// After a step that took step_ms, and its first pass first_pass_ms: the step to draw in left_ms,

@@ -12,9 +12,11 @@ namespace isowave::core {
 
 /// Draws frames with a time budget by a renderer that can keep a picture, in steps: with 1/8, 1/4
 /// and 1/2 of the rays along each axis, then with all rays. Smaller pictures have one ray per
-/// pixel. If the renderer has levels of detail, smaller pictures use levels whose voxels are at
-/// most one of their pixels apart. A budget ends when the arrays that are fetched are in the host's
-/// memory, if those of the frame before were the same. Requests without a budget are handed on.
+/// pixel. If that makes them faster (Abilities::levels_pay), they use levels of detail whose voxels
+/// are at most one of their pixels apart; else those of the whole picture, so that a step finds the
+/// blocks of the step before decoded. A budget ends when the arrays that are fetched are in the
+/// host's memory, if those of the frame before were the same. Requests without a budget are handed
+/// on.
 class TimedRenderer : public RendererAround {
  public:
   using Clock = std::function<double()>;  ///< [ms]
@@ -24,17 +26,18 @@ class TimedRenderer : public RendererAround {
   /// Throws  Error: the renderer was made to keep no picture
   explicit TimedRenderer(Renderer &inner, Clock now = steady_clock_ms)
       : RendererAround(inner), now_(std::move(now)) {
-    check_keeps_picture();
+    set_up();
   }
   explicit TimedRenderer(std::unique_ptr<Renderer> inner, Clock now = steady_clock_ms)
       : RendererAround(std::move(inner)), now_(std::move(now)) {
-    check_keeps_picture();
+    set_up();
   }
 
   Abilities abilities() const override;
 
-  /// Draws the smallest picture, however long that takes. Each further step draws the largest
-  /// picture that is expected to be whole in time, by the times of steps in the frame before. If a
+  /// Draws a first picture, however long that takes: the smallest one, or for further frames of an
+  /// isovalue the largest one that last took at most half of the time. Each further step draws the
+  /// largest picture that is expected to be whole in time, by the times of earlier frames. If a
   /// picture is not whole in time, the picture before fills it. The hit buffer then holds a picture
   /// of the full size. The request's on_pass is called after each pass, while the renderer has a
   /// picture of the step's size. If it returns false, the frame ends, even in the smallest picture.
@@ -59,19 +62,22 @@ class TimedRenderer : public RendererAround {
     bool is_stopped = false;
   };
 
-  void check_keeps_picture() const;
+  void set_up();
   void check_can_keep(const FrameRequest &request) const;
   double now_ms();
   FrameRequest request_of(const FrameRequest &request, std::size_t step) const;
   Drawn draw_step(const FrameRequest &request, std::size_t step, bool is_first, double begin_ms,
                   double end_ms);
+  std::size_t first_step(float isovalue, double left_ms) const;
   std::size_t next_step(std::size_t step, double step_ms, double first_pass_ms,
                         double left_ms) const;
 
   Clock now_;
+  bool levels_pay_ = false;  ///< rank 0's: all ranks must decide alike
   /// Time of each step when it was drawn last [ms]; 0: unknown.
   std::array<double, kNumSteps> last_ms_{};
-  double fetch_ms_ = 0;  ///< time of the last fetch() after a frame
+  std::optional<float> isovalue_{};  ///< of the last frame
+  double fetch_ms_ = 0;              ///< time of the last fetch() after a frame
 };
 
 }  // namespace isowave::core

@@ -207,6 +207,13 @@ Abilities DeviceRenderer::abilities_of(const RendererOptions &options) {
   return abilities;
 }
 
+Abilities DeviceRenderer::abilities() const {
+  Abilities abilities = abilities_of(options_);
+  // Frames of several levels are not drawn in packets, which a CPU needs.
+  abilities.levels_pay = abilities.levels && !MarchPackets::suits(device_.info());
+  return abilities;
+}
+
 std::vector<VolumeInfo> DeviceRenderer::levels() const {
   return infos_of(blocks_.levels);
 }

@@ -51,7 +51,7 @@ class DeviceRenderer : public Renderer {
 
   /// The abilities of a renderer with such options.
   static Abilities abilities_of(const RendererOptions &options);
-  Abilities abilities() const override { return abilities_of(options_); }
+  Abilities abilities() const override;
   std::vector<VolumeInfo> levels() const override;
 
   /// The box around the blocks that isosurfaces may be in; none if they are in no block.

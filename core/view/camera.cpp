@@ -1,6 +1,7 @@
 #include "core/view/camera.hpp"
 
 #include <cmath>
+#include <glm/gtc/quaternion.hpp>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -112,6 +113,13 @@ void check_camera(const Camera &camera, std::string_view what) {
   if (glm::length(glm::cross(view / view_length, camera.up / up_length)) < kMinSinViewUp) {
     throw Error("{}: up is parallel to the view; choose another up", what);
   }
+}
+
+Camera turned(const Camera &camera, double degrees) {
+  const glm::dquat turn = glm::angleAxis(glm::radians(degrees), glm::normalize(camera.up));
+  Camera result = camera;
+  result.eye = camera.at + turn * (camera.eye - camera.at);
+  return result;
 }
 
 Camera in_parallel(const Camera &camera) {

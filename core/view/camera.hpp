@@ -38,6 +38,8 @@ CameraFile read_camera_file(const std::filesystem::path &path);
 /// Throws  Error: the camera is degenerate (see read_camera_file); `what` names it
 void check_camera(const Camera &camera, std::string_view what);
 
+/// The camera, moved around what it looks at, about the axis `up`.
+Camera turned(const Camera &camera, double degrees);
 /// The same view in parallel projection, in which what is as far away as `at` has the same size.
 Camera in_parallel(const Camera &camera);
 /// The height of a pixel at a distance from the eye [world units].

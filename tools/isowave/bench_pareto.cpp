@@ -4,255 +4,139 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <chrono>
-#include <cmath>
 #include <filesystem>
-#include <limits>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "core/accuracy/choose_detail.hpp"
-#include "core/accuracy/compare.hpp"
 #include "core/accuracy/flip.hpp"
-#include "core/accuracy/with_choices.hpp"
 #include "core/base/error.hpp"
+#include "core/base/ms_since.hpp"
 #include "core/base/parallel_for.hpp"
 #include "core/io/file_name.hpp"
+#include "core/io/input_file.hpp"
 #include "core/io/open_volume.hpp"
-#include "core/render/device_renderer.hpp"
+#include "core/sources/noise_on_device.hpp"
 #include "reference/accuracy.hpp"
+#include "reference/truth_picture.hpp"
 #include "tools/isowave/frame_options.hpp"
 #include "tools/isowave/outputs.hpp"
+#include "tools/isowave/pareto_ways.hpp"
 #include "tools/isowave/render_stats.hpp"
-#include "tools/isowave/renderer_options.hpp"
 #include "tools/isowave/strict_options.hpp"
 
 namespace isowave::core::tools {
 
 namespace {
 
+namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
 struct BenchParetoArgs {
-  std::string input, size = "640x360", device, json;
+  std::string input, size = "640x360", device, json, pictures;
   float isovalue = 0;
   VolumeOptions volume;
-  std::vector<std::string> storages = {"rate:2", "rate:4", "rate:8", "tolerance-relative:0.01",
-                                       "tolerance-relative:0.002"};
-  std::vector<std::string> pipelines = {"rays", "blocks"}, solvers = {"linear", "bernstein"};
-  std::vector<double> all_voxel_pixels = {0, 0.5, 1, 2};
-  std::vector<double> voxel_errors = {0, 0.01, 0.04};     ///< as parts of the range of values
-  std::vector<double> max_surface_errors = {0.25, 1, 4};  ///< [pixels]
+  std::vector<std::string> ways, peers;
   std::uint32_t views = 3, rounds = 3;
 };
 
-/// "rate:4", "tolerance:0.5", "tolerance-relative:0.01" or "exact".
-CompressionOptions parse_storage(const std::string &text) {
-  CompressionOptions options;
-  const std::size_t colon = text.find(':');
-  const std::string kind = text.substr(0, colon);
-  if (text == "exact") {
-    options.exact = true;
-    return options;
-  }
-  const std::string_view value =
-      colon == std::string::npos ? "" : std::string_view(text).substr(colon + 1);
-  const std::optional<std::uint64_t> rate = parse_whole(value);
-  const std::optional<double> number = parse_finite(value);
-  if (kind == "rate" && rate && *rate >= 1 && *rate <= 32) {
-    options.rate = static_cast<std::uint32_t>(*rate);
-  } else if (kind == "tolerance" && number && *number > 0) {
-    options.tolerance = number;
-  } else if (kind == "tolerance-relative" && number && *number > 0) {
-    options.relative_tolerance = number;
-  } else {
-    throw Error("--storage {}: give rate:R, tolerance:E, tolerance-relative:E or exact", text);
-  }
-  return options;
-}
+/// Rays of a pixel of the truth along each axis: 81 in all. No way to draw has the same ones.
+constexpr std::uint32_t kTruthSamples = 9;
+/// A channel of a pixel that is wrong differs from the truth by more than this, of 255.
+constexpr int kWrongStep = 16;
 
-/// The images of a frame.
-struct View {
-  FloatImage depth;
+/// The picture that a view should have.
+struct Truth {
+  explicit Truth(Image8 truth) : picture(std::move(truth)), flip(picture) {}
   Image8 picture;
-  std::vector<HitRecord> hits;
-};
-
-View view_of(DeviceRenderer &renderer) {
-  View view;
-  view.hits = renderer.hits();
-  view.picture = renderer.shade();
-  view.depth = {view.picture.width, view.picture.height, depth_of(view.hits)};
-  return view;
-}
-
-/// The images that a frame should have.
-struct Truth : View {
-  explicit Truth(View view) : View(std::move(view)), flip(picture) {}
   Flip flip;
 };
 
-/// Angles between the gradients, in index space, of pixels with a hit in both: 99th percentile
-/// [degrees].
-double normal_error(const View &truth, const View &view) {
-  std::vector<double> angles;
-  for (std::size_t i = 0; i < view.hits.size(); ++i) {
-    const HitRecord &a = truth.hits[i], &b = view.hits[i];
-    const glm::dvec3 m(a.grad_x, a.grad_y, a.grad_z), n(b.grad_x, b.grad_y, b.grad_z);
-    const double lengths = glm::length(m) * glm::length(n);
-    if (std::isfinite(a.t) && std::isfinite(b.t) && lengths > 0)
-      angles.push_back(glm::degrees(std::acos(std::clamp(glm::dot(m, n) / lengths, -1.0, 1.0))));
-  }
-  return quantiles(std::move(angles)).p99;
-}
-
-/// The worst of the views, but the sums of pixels.
-struct Errors {
-  std::uint64_t pixels = 0, missed = 0, false_hits = 0;
-  double depth_p99 = 0;   ///< [voxels]
-  double normal_p99 = 0;  ///< [degrees]
-  double flip = 0;
-  double psnr_db = std::numeric_limits<double>::infinity();  ///< infinite: the same pictures
-
-  double wrong_pixels() const { return double(missed + false_hits) / double(pixels); }
-
-  bool no_worse_than(const Errors &other) const {
-    return wrong_pixels() <= other.wrong_pixels() && depth_p99 <= other.depth_p99 &&
-           normal_p99 <= other.normal_p99 && flip <= other.flip;
-  }
-
-  void add(const Errors &other) {
-    pixels += other.pixels;
-    missed += other.missed;
-    false_hits += other.false_hits;
-    depth_p99 = std::max(depth_p99, other.depth_p99);
-    normal_p99 = std::max(normal_p99, other.normal_p99);
-    flip = std::max(flip, other.flip);
-    psnr_db = std::min(psnr_db, other.psnr_db);
-  }
-};
-
-Errors errors_of(const Truth &truth, const View &view, double voxel) {
-  Errors errors;
-  const DepthComparison depth = compare_depth(truth.depth, view.depth);
-  errors.pixels = depth.num_pixels;
-  errors.missed = depth.false_negatives;
-  errors.false_hits = depth.false_positives;
-  if (depth.error) errors.depth_p99 = depth.error->p99 / voxel;
-  errors.normal_p99 = normal_error(truth, view);
-  const std::optional<double> psnr = compare_colour(truth.picture, view.picture).psnr_db;
-  if (!psnr) return errors;
-  errors.psnr_db = *psnr;
-  errors.flip = truth.flip.error(view.picture);
-  return errors;
-}
-
 /// One volume, its views, and what they should show.
 struct ParetoSubject {
+  VolumeInfo info;
   std::vector<Camera> cameras;
   ImageSize size;
-  double voxel = 0;        ///< longest of its spacings [world units]
   double value_range = 0;  ///< largest minus smallest value
   float isovalue = 0;
-  std::uint32_t rounds = 0;  ///< times that each view is drawn
-  std::vector<Truth> truth;  ///< of each view
+  std::uint32_t rounds = 0;            ///< times that each view is drawn
+  std::vector<Truth> truth, with_sky;  ///< of each view; without and with ambient rays
+  double truth_ms = 0;
 };
 
-/// A volume as it is stored.
-struct Stored {
-  std::string name;  ///< as parse_storage() reads it
-  CompressedVolume volume;
+/// Means of the views.
+struct PictureErrors {
+  double flip = 0;
+  double wrong_pixels = 0;  ///< as a part of all
 };
 
-/// One way to draw all views, and what it costs.
+/// A way to draw, and what came of it.
 struct Point {
-  const Stored *stored = nullptr;
-  std::string pipeline = "rays";
-  std::string solver{to_string(kDefaultSolver)};
-  std::vector<Detail> details;              ///< of each view
-  std::optional<double> max_surface_error;  ///< [pixels], for which they were chosen
-  std::vector<bool> reachable;              ///< DetailChoice::reachable, of each view
-  double ms = 0;                            ///< median of all cold frames
-  std::uint64_t decoded_blocks = 0;         ///< mean of the views
-  Errors errors;
-  std::optional<double> over_front;  ///< see compare_choices()
+  std::string name;
+  bool is_peer = false;
+  std::optional<double> cold_ms;  ///< median of first frames of an isovalue, picture in memory
+  double next_ms = 0;             ///< the same of frames one degree further
+  std::uint64_t stored_bytes = 0, memory_bytes = 0;
+  PictureErrors errors;
 };
 
-/// Whether the levels of detail must be there for it.
-bool has_levels(const Point &point) {
-  return point.max_surface_error || point.details.front().voxel_pixels > 0;
-}
-
-DeviceRenderer make_renderer(ocl::Device &device, const ParetoSubject &subject,
-                             const Point &point) {
-  RendererFlags flags{.pipeline = point.pipeline, .solver = point.solver, .values = {}};
-  if (!point.max_surface_error) flags.voxel_pixels = point.details.front().voxel_pixels;
-  const RendererOptions options = to_renderer_options(flags, subject.size);
-  const CompressedVolume &volume = point.stored->volume;
-  return DeviceRenderer(device, volume,
-                        point.max_surface_error ? with_choices(options, volume) : options);
-}
-
-FrameRequest request_of(const ParetoSubject &subject, const Point &point, std::size_t view) {
-  FrameRequest request =
-      with_detail({subject.cameras[view], subject.isovalue}, point.details[view]);
-  request.normals = Normals::kCell;
-  return request;
-}
-
-/// Draws one view of the point once: the first frame of an isovalue, or of a precision, does more.
-void warm_up(DeviceRenderer &renderer, const ParetoSubject &subject, const Point &point,
-             std::size_t view) {
-  renderer.render(request_of(subject, point, view));
-}
-
-FrameStats draw_cold(DeviceRenderer &renderer, const ParetoSubject &subject, const Point &point,
-                     std::size_t view) {
-  renderer.clear_cache();
-  return renderer.render(request_of(subject, point, view));
-}
-
-/// Draws every view `rounds` times from an empty cache.
-void measure(DeviceRenderer &renderer, const ParetoSubject &subject, Point &point) {
-  std::vector<double> times;
-  std::uint64_t decoded = 0;
-  std::vector<View> views;
-  for (std::size_t view = 0; view < subject.cameras.size(); ++view) {
-    warm_up(renderer, subject, point, view);
-    for (std::uint32_t round = 0; round < subject.rounds; ++round) {
-      const FrameStats stats = draw_cold(renderer, subject, point, view);
-      times.push_back(stats.total_ms);
-      for (const PassStats &pass : stats.passes)
-        decoded += round == 0 ? pass.counts.decoded_count : 0;
-    }
-    views.push_back(view_of(renderer));
+double share_of_wrong_pixels(const Image8 &truth, const Image8 &picture) {
+  std::uint64_t wrong = 0;
+  const std::size_t num_pixels = std::size_t{truth.width} * truth.height;
+  for (std::size_t pixel = 0; pixel < num_pixels; ++pixel) {
+    bool differs = false;
+    for (std::size_t i = 3 * pixel; i < 3 * pixel + 3; ++i)
+      differs |= std::abs(int{truth.pixels[i]} - int{picture.pixels[i]}) > kWrongStep;
+    wrong += differs;
   }
-  std::vector<Errors> errors(views.size());
-  parallel_for(views.size(), 0, [&](std::uint64_t view, std::uint32_t) {
-    errors[view] = errors_of(subject.truth[view], views[view], subject.voxel);
+  return double(wrong) / double(num_pixels);
+}
+
+/// pictures  of the views, with the size of the truth
+PictureErrors errors_of(const std::vector<Truth> &truth, const std::vector<Image8> &pictures) {
+  std::vector<PictureErrors> of_views(pictures.size());
+  parallel_for(pictures.size(), 0, [&](std::uint64_t view, std::uint32_t) {
+    of_views[view] = {truth[view].flip.error(pictures[view]),
+                      share_of_wrong_pixels(truth[view].picture, pictures[view])};
   });
-  for (const Errors &of_view : errors) point.errors.add(of_view);
-  point.ms = quantiles(std::move(times)).p50;
-  point.decoded_blocks = decoded / subject.cameras.size();
+  PictureErrors mean;
+  for (const PictureErrors &of_view : of_views) {
+    mean.flip += of_view.flip / double(of_views.size());
+    mean.wrong_pixels += of_view.wrong_pixels / double(of_views.size());
+  }
+  return mean;
 }
 
-/// How many times as long as the other one takes: the median of cold frames drawn in turn.
-double time_ratio(ocl::Device &device, const ParetoSubject &subject, const Point &point,
-                  const Point &other) {
-  DeviceRenderer renderer = make_renderer(device, subject, point),
-                 others = make_renderer(device, subject, other);
-  std::vector<double> ratios;
-  for (std::size_t view = 0; view < subject.cameras.size(); ++view) {
-    warm_up(renderer, subject, point, view);
-    warm_up(others, subject, other, view);
-    for (std::uint32_t round = 0; round < subject.rounds; ++round) {
-      const double ms = draw_cold(renderer, subject, point, view).total_ms;
-      ratios.push_back(ms / draw_cold(others, subject, other, view).total_ms);
+/// A picture as a screen shows it larger: linear between the middles of its pixels.
+Image8 enlarged(const Image8 &image, ImageSize size) {
+  if (image.width == size.width && image.height == size.height) return image;
+  Image8 result{size.width, size.height, 3,
+                std::vector<std::uint8_t>(std::size_t{3} * size.num_pixels())};
+  const auto place = [](std::uint32_t at, std::uint32_t to, std::uint32_t from) {
+    return std::clamp((at + 0.5) * from / to - 0.5, 0.0, from - 1.0);
+  };
+  for (std::uint32_t row = 0; row < size.height; ++row) {
+    const double y = place(row, size.height, image.height);
+    const auto y0 = static_cast<std::size_t>(y),
+               y1 = std::min<std::size_t>(y0 + 1, image.height - 1);
+    for (std::uint32_t column = 0; column < size.width; ++column) {
+      const double x = place(column, size.width, image.width);
+      const auto x0 = static_cast<std::size_t>(x),
+                 x1 = std::min<std::size_t>(x0 + 1, image.width - 1);
+      for (std::size_t channel = 0; channel < 3; ++channel) {
+        const auto value = [&](std::size_t i, std::size_t j) {
+          return double(image.pixels[3 * (j * image.width + i) + channel]);
+        };
+        const double above = std::lerp(value(x0, y0), value(x1, y0), x - double(x0)),
+                     below = std::lerp(value(x0, y1), value(x1, y1), x - double(x0));
+        result.pixels[3 * (std::size_t{row} * size.width + column) + channel] =
+            static_cast<std::uint8_t>(std::lerp(above, below, y - double(y0)) + 0.5);
+      }
     }
   }
-  return quantiles(std::move(ratios)).p50;
+  return result;
 }
 
 /// Bytes of the stored volume that frames need.
@@ -264,227 +148,236 @@ std::uint64_t stored_bytes(const CompressedVolume &volume, bool with_levels) {
   return bytes;
 }
 
-ParetoSubject make_subject(ocl::Device &device, const BenchParetoArgs &options) {
+/// Draws every view `rounds` times: with nothing decoded, one degree further, and one degree back,
+/// which is the picture that is judged.
+Point measure(ocl::Device &device, const ParetoSubject &subject, const CompressedVolume &volume,
+              const ParetoWay &way, std::vector<Image8> &pictures) {
+  const auto renderer = make_renderer(device, volume, way, subject.size);
+  const FrameRequest request = request_of(way, subject.size, subject.isovalue, subject.value_range);
+  FrameArrays arrays;  // a user has the last frame's until the next is there
+  const auto draw = [&](const Camera &camera) {
+    const auto begin = std::chrono::steady_clock::now();
+    renderer->render(seen_from(camera, request));
+    arrays = renderer->fetch({.picture = true}, {});
+    return ms_since(begin);
+  };
+  std::vector<double> cold, next;
+  draw(subject.cameras.front());  // makes memory, and compiles what is compiled late
+  for (const Camera &camera : subject.cameras) {
+    for (std::uint32_t round = 0; round < subject.rounds; ++round) {
+      renderer->clear_cache();
+      cold.push_back(draw(camera));
+      next.push_back(draw(turned(camera, 1)));
+      next.push_back(draw(camera));
+    }
+    pictures.push_back(enlarged(image_of(renderer->size(), arrays.picture), subject.size));
+  }
+  Point point;
+  point.name = way.name;
+  point.cold_ms = quantiles(std::move(cold)).p50;
+  point.next_ms = quantiles(std::move(next)).p50;
+  point.stored_bytes = stored_bytes(volume, way.needs_levels());
+  point.memory_bytes = renderer->memory_bytes();
+  point.errors = errors_of(way.ambient_rays != 0 ? subject.with_sky : subject.truth, pictures);
+  return point;
+}
+
+std::vector<const ParetoWay *> chosen_ways(const std::vector<std::string> &names) {
+  std::vector<const ParetoWay *> ways;
+  for (const ParetoWay &way : pareto_ways()) {
+    if (names.empty() || std::ranges::find(names, way.name) != names.end()) ways.push_back(&way);
+  }
+  for (const std::string &name : names) {
+    if (std::ranges::find(pareto_ways(), name, &ParetoWay::name) == pareto_ways().end())
+      throw Error("--ways {}: there is no such way to draw; `isowave bench pareto --help` has them",
+                  name);
+  }
+  return ways;
+}
+
+/// Draws the truth of all views. info: the device that generators may use
+ParetoSubject make_subject(const BenchParetoArgs &options, const ocl::DeviceInfo &info,
+                           bool with_sky) {
   ParetoSubject subject;
   subject.size = parse_size(options.size);
   subject.isovalue = options.isovalue;
   subject.rounds = options.rounds;
-  check_image_size(subject.size);
-  const RawOverrides overrides = to_overrides(options.volume);
-  const CompressedVolume finest = load_volume(options.input, overrides, {});  // the truth
-  const VolumeInfo &info = finest.info;
-  subject.cameras = orbit_cameras(info, options.views);
-  subject.voxel = std::max({info.spacing.x, info.spacing.y, info.spacing.z});
-  subject.value_range = double{finest.value_range[1]} - double{finest.value_range[0]};
-  DeviceRenderer renderer(device, finest, {.size = subject.size});
+  check_image_size({subject.size.width, subject.size.height, ImageSize::kMaxSamples});
+  const auto reader = open_any_volume(options.input, to_overrides(options.volume), noise_on(info));
+  subject.info = reader->info();
+  const glm::uvec3 dims = subject.info.dims;
+  std::vector<float> voxels(subject.info.num_voxels());
+  reader->read_layers(0, dims.z, voxels);
+  if (!std::ranges::all_of(voxels, [](float value) { return std::isfinite(value); }))
+    throw Error("{}: has voxels without a number, of which there is no true picture",
+                options.input);
+  const auto [least, most] = std::ranges::minmax(voxels);
+  subject.value_range = double{most} - double{least};
+  subject.cameras = orbit_cameras(subject.info, options.views);
+  const auto begin = std::chrono::steady_clock::now();
+  const GridOracle oracle(voxels, {dims.x, dims.y, dims.z}, options.isovalue);
+  const ImageSize size{subject.size.width, subject.size.height, kTruthSamples};
   for (const Camera &camera : subject.cameras) {
-    renderer.render({.camera = camera, .isovalue = options.isovalue, .normals = Normals::kCell});
-    subject.truth.emplace_back(view_of(renderer));
+    subject.truth.emplace_back(truth_picture(oracle, subject.info, camera, size));
+    if (with_sky)
+      subject.with_sky.emplace_back(truth_picture(oracle, subject.info, camera, size, Sky::kSeen));
   }
+  subject.truth_ms = ms_since(begin);
   return subject;
 }
 
-std::uint64_t stored_bytes(const Point &point) {
-  return stored_bytes(point.stored->volume, has_levels(point));
+constexpr const char *kRowFormat = "{:<30} {:>10} {:>10} {:>8} {:>9} {:>12} {:>12}\n";
+
+void print(const Point &point) {
+  fmt::print(kRowFormat, point.name, point.cold_ms ? fmt::format("{:.3f}", *point.cold_ms) : "-",
+             fmt::format("{:.3f}", point.next_ms), fmt::format("{:.5f}", point.errors.flip),
+             fmt::format("{:.2e}", point.errors.wrong_pixels), with_commas(point.stored_bytes),
+             with_commas(point.memory_bytes));
 }
 
-constexpr const char *kRowFormat =
-    "{:<26} {:<6} {:<9} {:>6} {:>6} {:>11} {:>9} {:>9} {:>9} {:>9} {:>7} {:>7} {:>6}\n";
-
-void print_header() {
-  fmt::print(kRowFormat, "storage", "", "solver", "px", "value", "bytes", "ms cold", "decoded",
-             "wrong", "depth p99", "normal", "FLIP", "PSNR");
+ordered_json to_json(const Point &point) {
+  return {{"way", point.name},
+          {"is_peer", point.is_peer},
+          {"cold_ms", point.cold_ms ? ordered_json(*point.cold_ms) : ordered_json()},
+          {"next_ms", point.next_ms},
+          {"flip", point.errors.flip},
+          {"wrong_pixels", point.errors.wrong_pixels},
+          {"stored_bytes", point.stored_bytes},
+          {"memory_bytes", point.memory_bytes}};
 }
 
-/// The error as a part of the range of values, which may be 0 if the error is 0.
-double part_of(double value_range, double voxel_error) {
-  return voxel_error == 0 ? 0 : voxel_error / value_range;
-}
-
-void print(const Point &point, double value_range) {
-  const auto text = [&](double number) {
-    return point.max_surface_error ? "by view" : fmt::format("{:.4g}", number);
-  };
-  const Errors &errors = point.errors;
-  fmt::print(
-      kRowFormat, point.stored->name, point.pipeline,
-      point.max_surface_error ? fmt::format("error {}", *point.max_surface_error) : point.solver,
-      text(point.details.front().voxel_pixels),
-      text(part_of(value_range, point.details.front().voxel_error)),
-      with_commas(stored_bytes(point)), fmt::format("{:.3f}", point.ms),
-      with_commas(point.decoded_blocks), fmt::format("{:.2e}", errors.wrong_pixels()),
-      fmt::format("{:.2e}", errors.depth_p99), fmt::format("{:.2f}", errors.normal_p99),
-      fmt::format("{:.4f}", errors.flip),
-      std::isfinite(errors.psnr_db) ? fmt::format("{:.1f}", errors.psnr_db) : "same");
-}
-
-ordered_json to_json(const Point &point, double value_range) {
-  const auto or_null = [](const std::optional<double> &number) {
-    return number ? ordered_json(*number) : ordered_json();
-  };
-  const auto detail_json = [&](const Detail &detail) -> ordered_json {
-    return {{"voxel_pixels", detail.voxel_pixels},
-            {"voxel_error", part_of(value_range, detail.voxel_error)}};
-  };
-  const Errors &errors = point.errors;
-  ordered_json json = {
-      {"storage", point.stored->name},
-      {"bytes", stored_bytes(point)},
-      {"rate", point.stored->volume.rate()},
-      {"pipeline", point.pipeline},
-      {"solver", point.solver},
-      {"voxel_pixels", nullptr},
-      {"voxel_error", nullptr},
-      {"max_surface_error", or_null(point.max_surface_error)},
-      {"ms", point.ms},
-      {"decoded_blocks", point.decoded_blocks},
-      {"wrong_pixels", errors.wrong_pixels()},
-      {"missed", errors.missed},
-      {"false", errors.false_hits},
-      {"depth_p99", errors.depth_p99},
-      {"normal_p99", errors.normal_p99},
-      {"flip", errors.flip},
-      {"psnr_db", std::isfinite(errors.psnr_db) ? ordered_json(errors.psnr_db) : ordered_json()}};
-  if (!point.max_surface_error) {
-    json.update(detail_json(point.details.front()));
-    return json;
+/// Points of what other programs drew, from the JSON of bench/peer_bench or bench/gpu_peer.
+///
+/// Throws  Error: it is no such file, or is of other views
+std::vector<Point> read_peers(const std::string &path, const ParetoSubject &subject) {
+  std::vector<Point> points;
+  try {
+    const InputFile file(path);
+    std::string text(file.size(), '\0');
+    file.read(0, std::as_writable_bytes(std::span(text)));
+    const nlohmann::json document = nlohmann::json::parse(text);
+    for (const nlohmann::json &peer : document.at("pareto_peers")) {
+      if (peer.at("isovalue").get<float>() != subject.isovalue ||
+          peer.at("pictures").size() != subject.cameras.size() ||
+          peer.at("size") != nlohmann::json{subject.size.width, subject.size.height})
+        throw Error("{}: its pictures are of another isovalue, size or number of views", path);
+      std::vector<Image8> pictures;
+      for (const nlohmann::json &name : peer.at("pictures"))
+        pictures.push_back(read_png(fs::path(path).parent_path() / name.get<std::string>()));
+      Point point;
+      point.name = peer.at("name");
+      point.is_peer = true;
+      if (peer.at("ms").contains("cold")) point.cold_ms = peer["ms"]["cold"];
+      point.next_ms = peer.at("ms").at("next");
+      point.memory_bytes = peer.at("bytes");
+      point.errors = errors_of(subject.truth, pictures);
+      points.push_back(std::move(point));
+    }
+  } catch (const nlohmann::json::exception &) {
+    throw Error("{}: was not written by peer_bench or gpu_peer with --pictures", path);
   }
-  json["chosen"] = ordered_json::array();
-  for (std::size_t view = 0; view < point.details.size(); ++view) {
-    json["chosen"].push_back(detail_json(point.details[view]));
-    json["chosen"].back()["reachable"] = bool{point.reachable[view]};
-  }
-  json["over_front"] = or_null(point.over_front);
-  return json;
+  return points;
 }
 
-/// Every pipeline, solver, level of detail and precision of one stored volume.
-void sweep(ocl::Device &device, const ParetoSubject &subject, const BenchParetoArgs &options,
-           const Stored &stored, std::vector<Point> &points) {
-  for (const std::string &pipeline : options.pipelines) {
-    for (const std::string &solver : options.solvers) {
-      for (const double voxel_pixels : options.all_voxel_pixels) {
-        if (pipeline == "blocks" && voxel_pixels > 0) continue;
-        Point point;
-        point.stored = &stored;
-        point.pipeline = pipeline;
-        point.solver = solver;
-        point.details.resize(subject.cameras.size(), Detail{.voxel_pixels = voxel_pixels});
-        DeviceRenderer renderer = make_renderer(device, subject, point);
-        for (const double voxel_error : options.voxel_errors) {
-          for (Detail &detail : point.details)
-            detail.voxel_error = voxel_error * subject.value_range;
-          points.push_back(point);
-          measure(renderer, subject, points.back());
-          print(points.back(), subject.value_range);
-        }
-      }
+/// The files of a way's pictures.
+void write_pictures(const std::string &folder, const std::string &name,
+                    const std::vector<Image8> &pictures) {
+  if (folder.empty()) return;
+  std::string stem = name;
+  std::ranges::replace_if(
+      stem, [](char c) { return c == ' ' || c == '/' || c == '%'; }, '_');
+  for (std::size_t view = 0; view < pictures.size(); ++view)
+    write_png(pictures[view], fs::path(folder) / fmt::format("pareto_{}_{}.png", stem, view));
+}
+
+/// Measures the ways, each kind of storage in one go.
+std::vector<Point> measure_ways(ocl::Device &device, const ParetoSubject &subject,
+                                const BenchParetoArgs &options,
+                                const std::vector<const ParetoWay *> &ways) {
+  std::map<std::pair<std::optional<std::uint32_t>, std::optional<double>>,
+           std::vector<const ParetoWay *>>
+      by_storage;
+  for (const ParetoWay *way : ways) by_storage[{way->rate, way->relative_tolerance}].push_back(way);
+  std::vector<Point> points;
+  for (const auto &[storage, of_storage] : by_storage) {
+    CompressionOptions compression{.rate = storage.first, .relative_tolerance = storage.second};
+    if (std::ranges::any_of(of_storage, &ParetoWay::needs_levels)) compression.levels = 0;
+    compression.measure_error = std::ranges::any_of(
+        of_storage, [](const ParetoWay *way) { return way->max_surface_error.has_value(); });
+    const CompressedVolume volume =
+        load_volume(options.input, to_overrides(options.volume), compression, &device);
+    for (const ParetoWay *way : of_storage) {
+      std::vector<Image8> pictures;
+      points.push_back(measure(device, subject, volume, *way, pictures));
+      print(points.back());
+      write_pictures(options.pictures, way->name, pictures);
     }
   }
+  return points;
 }
 
-/// The detail that render --max-surface-error chooses for each view.
-void choose(ocl::Device &device, const ParetoSubject &subject, const BenchParetoArgs &options,
-            const Stored &stored, std::vector<Point> &points) {
-  if (options.max_surface_errors.empty()) return;
-  Point any;
-  any.stored = &stored;
-  any.max_surface_error = options.max_surface_errors.front();
-  DeviceRenderer renderer = make_renderer(device, subject, any);
-  for (const double max_surface_error : options.max_surface_errors) {
-    Point point = any;
-    point.max_surface_error = max_surface_error;
-    for (const Camera &camera : subject.cameras) {
-      const DetailChoice choice =
-          choose_detail(renderer, stored.volume, {camera, subject.isovalue}, max_surface_error);
-      point.details.push_back(choice.detail);
-      point.reachable.push_back(choice.reachable);
-    }
-    measure(renderer, subject, point);
-    print(point, subject.value_range);
-    points.push_back(std::move(point));
-  }
-}
-
-/// Sets Point::over_front of the choices of --max-surface-error: how many times as long they take
-/// as the fastest point of the sweep that is no worse in any error; none if all are worse. The
-/// two are drawn in turn, once more: of many points that take as long, the one that seemed to be
-/// the fastest mostly was lucky.
-void compare_choices(ocl::Device &device, const ParetoSubject &subject,
-                     std::vector<Point> &points) {
-  for (Point &choice : points) {
-    if (!choice.max_surface_error) continue;
-    const Point *fastest = nullptr;
-    for (const Point &point : points) {
-      if (!point.max_surface_error && point.errors.no_worse_than(choice.errors) &&
-          (!fastest || point.ms < fastest->ms))
-        fastest = &point;
-    }
-    if (!fastest) continue;
-    choice.over_front = time_ratio(device, subject, choice, *fastest);
-    fmt::print(
-        "{}, --max-surface-error {}: {:.2f} times the time of the fastest point that is no worse\n",
-        choice.stored->name, *choice.max_surface_error, *choice.over_front);
-  }
-}
-
-void run_bench_pareto(BenchParetoArgs options) {
+void run_bench_pareto(const BenchParetoArgs &options) {
   Outputs outputs;
   outputs.read_volume(options.input);
+  for (const std::string &peers : options.peers) outputs.read(peers);
   outputs.write("--json", options.json);
   check_json_name(options.json);
-  for (const std::string &solver : options.solvers) solver_from_string(solver);
+  if (!options.pictures.empty()) outputs.write_pictures("--pictures", options.pictures, "pareto_");
   if (is_zfp_name(options.input))
     throw Error("{}: is compressed already: give the volume that is to be compressed",
                 options.input);
-  for (const std::string &storage : options.storages) parse_storage(storage);
-  std::erase(options.max_surface_errors, 0.0);
-  for (const double max_surface_error : options.max_surface_errors)
-    check_max_surface_error(max_surface_error);
+  const std::vector<const ParetoWay *> ways = chosen_ways(options.ways);
   const ocl::DeviceInfo info = ocl::choose_device(options.device);
   fmt::print("device {}: {} ({})\n", info.index, info.name, info.platform);
   ocl::Device device(info);
-  const ParetoSubject subject = make_subject(device, options);
-  std::vector<Stored> stored;
-  for (const std::string &storage : options.storages) {
-    CompressionOptions compression = parse_storage(storage);
-    const bool with_levels =
-        !options.max_surface_errors.empty() ||
-        std::ranges::any_of(options.all_voxel_pixels, [](double e) { return e > 0; });
-    compression.levels = with_levels ? 0 : 1;
-    compression.measure_error = !options.max_surface_errors.empty();
-    stored.push_back(
-        {storage, load_volume(options.input, to_overrides(options.volume), compression)});
+  const bool with_sky =
+      std::ranges::any_of(ways, [](const ParetoWay *way) { return way->ambient_rays != 0; });
+  const ParetoSubject subject = make_subject(options, info, with_sky);
+  outputs.make_folder();
+  fmt::print("truth: {} rays a pixel, {:.0f} ms\n", kTruthSamples * kTruthSamples,
+             subject.truth_ms);
+  for (std::size_t view = 0; view < subject.truth.size(); ++view)
+    write_pictures(options.pictures, fmt::format("truth_{}", view), {subject.truth[view].picture});
+  fmt::print(kRowFormat, "", "ms, new", "ms, next", "FLIP", "wrong", "bytes stored",
+             "bytes to draw");
+  std::vector<Point> points = measure_ways(device, subject, options, ways);
+  for (const std::string &path : options.peers) {
+    for (Point &point : read_peers(path, subject)) {
+      print(point);
+      points.push_back(std::move(point));
+    }
   }
-  std::vector<Point> points;
-  print_header();
-  for (const Stored &volume : stored) {
-    sweep(device, subject, options, volume, points);
-    choose(device, subject, options, volume, points);
-  }
-  compare_choices(device, subject, points);
   if (options.json.empty()) return;
   ordered_json json = ordered_json::array();
-  for (const Point &point : points) json.push_back(to_json(point, subject.value_range));
+  for (const Point &point : points) json.push_back(to_json(point));
   write_json({{"schema", kChartsSchema},
               {"benchmark", "pareto"},
               {"device", device_json(info)},
               {"date", fmt::format("{:%Y-%m-%d}", fmt::gmtime(std::chrono::system_clock::now()))},
               {"volume", options.input},
+              {"dims", {subject.info.dims.x, subject.info.dims.y, subject.info.dims.z}},
               {"isovalue", options.isovalue},
               {"size", {subject.size.width, subject.size.height}},
               {"views", options.views},
               {"rounds", options.rounds},
+              {"truth_rays", kTruthSamples * kTruthSamples},
               {"points", json}},
              options.json);
+}
+
+std::string names_of_ways() {
+  std::string names;
+  for (const ParetoWay &way : pareto_ways()) names += (names.empty() ? "" : "; ") + way.name;
+  return names;
 }
 
 }  // namespace
 
 void add_bench_pareto(CLI::App &bench) {
-  CLI::App *command = bench.add_subcommand("pareto",
-                                           "Bytes and ms of cold frames beside their errors, for "
-                                           "storage, pipeline, solver, level and precision");
+  CLI::App *command = bench.add_subcommand(
+      "pareto",
+      "Speed against accuracy: ms until the picture is in memory, and its error against "
+      "81 rays a pixel of the uncompressed voxels, for each way to draw");
   const auto options = std::make_shared<BenchParetoArgs>();
   command->add_option("VOLUME", options->input, kVolumeHelp)->required();
   command->add_option("--isovalue,-i", options->isovalue, "isovalue")
@@ -492,38 +385,13 @@ void add_bench_pareto(CLI::App &bench) {
       ->required();
   add_volume_options(*command, options->volume);
   command
-      ->add_option("--storage", options->storages,
-                   "ways to compress the volume: rate:R, tolerance:E, tolerance-relative:E or "
-                   "exact; a list")
-      ->delimiter(',')
-      ->capture_default_str();
-  command->add_option("--pipeline", options->pipelines, "pipelines: rays, blocks; a list")
-      ->delimiter(',')
-      ->check(CLI::IsMember({"rays", "blocks"}))
-      ->capture_default_str();
+      ->add_option("--ways", options->ways,
+                   fmt::format("ways to draw, a list, of: {} [all]", names_of_ways()))
+      ->delimiter(',');
   command
-      ->add_option("--solver", options->solvers,
-                   "root finders: linear, marmitt, analytic, bernstein; a list")
-      ->delimiter(',')
-      ->capture_default_str();
-  command
-      ->add_option("--voxel-pixels", options->all_voxel_pixels,
-                   "as for render; pipeline blocks takes only 0; a list")
-      ->delimiter(',')
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
-  command
-      ->add_option("--voxel-error", options->voxel_errors,
-                   "as for render, but as parts of the range of values; a list")
-      ->delimiter(',')
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
-  command
-      ->add_option("--max-surface-error", options->max_surface_errors,
-                   "as for render, 0: none; each value is one more point; a list")
-      ->delimiter(',')
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
+      ->add_option("--peers", options->peers,
+                   "what peer_bench or gpu_peer drew: JSON with --pictures; a list")
+      ->delimiter(',');
   command->add_option("--size", options->size, "picture size WxH")->capture_default_str();
   command->add_option("--views", options->views, "views around the volume")
       ->check(CLI::Range(1u, 1000u))
@@ -535,6 +403,7 @@ void add_bench_pareto(CLI::App &bench) {
       ->capture_default_str();
   command->add_option("--device", options->device,
                       "device: index, cpu, gpu, or a part of its name");
+  command->add_option("--pictures", options->pictures, "folder for all pictures and the truth");
   command->add_option("--json", options->json, "file for the results, for tools/charts");
   command->callback([options] { run_bench_pareto(*options); });
 }

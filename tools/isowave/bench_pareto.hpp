@@ -1,6 +1,5 @@
 #pragma once
-// isowave bench pareto: what each choice costs, in bytes and milliseconds, and how wrong the
-// picture is for it.
+// isowave bench pareto: speed against accuracy, of each way to draw.
 
 #include <CLI/CLI.hpp>
 

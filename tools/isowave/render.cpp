@@ -27,6 +27,7 @@
 #include "core/io/npy.hpp"
 #include "core/io/png.hpp"
 #include "core/render/device_renderer.hpp"
+#include "core/stages/march_packets.hpp"
 #include "core/zfp/isovalue.hpp"
 #include "reference/twin_renderer.hpp"
 #include "tools/isowave/commands.hpp"
@@ -105,13 +106,21 @@ bool exceeds_host(const RenderArgs &options, const Drawing &drawing) {
          !ocl::list_devices().empty();
 }
 
+/// Whether levels of detail are chosen among those that the volume has.
+bool chooses_levels(const RenderArgs &options, const Drawing &drawing) {
+  return options.max_surface_error ||
+         (options.time_budget && drawing.device && options.renderer_flags.pipeline != "blocks" &&
+          !MarchPackets::suits(drawing.device->info()));
+}
+
 void load_alone(RenderArgs &options, Drawing &drawing) {
-  if (options.voxel_pixels > 0 || chooses_levels(options)) want_levels(options.frame.compression);
+  if (options.voxel_pixels > 0 || chooses_levels(options, drawing))
+    want_levels(options.frame.compression);
   Scene scene =
       load_scene(options.input, options.volume, options.frame, drawing.views, drawing.device.get());
   print_compression(options.input, scene.volume);
   options.renderer_flags.values.with_levels =
-      chooses_levels(options) && !scene.volume.coarser_levels.empty();
+      chooses_levels(options, drawing) && !scene.volume.coarser_levels.empty();
   drawing.whole = std::move(scene.volume);
   drawing.cameras = std::move(scene.cameras);
   if (exceeds_host(options, drawing)) {
@@ -135,7 +144,7 @@ void load_bricks(const RenderArgs &options, Drawing &drawing) {
   drawing.bricks = open_together(drawing.team, source, [&](std::vector<VolumeInfo> &levels) {
     if (!is_zfp_name(options.input)) warn_of_header(options.input, source.overrides);
     check_brick_levels(options, levels);
-    if (options.voxel_pixels == 0 && !chooses_levels(options)) levels.resize(1);
+    if (options.voxel_pixels == 0 && !chooses_levels(options, drawing)) levels.resize(1);
     drawing.cameras = make_cameras(options.input, levels.front(), options.frame, drawing.views);
   });
 }

@@ -60,11 +60,6 @@ bool asks_for_picture(const RenderArgs &options) {
   return !options.image.empty() || !options.progress_dir.empty() || !options.refined.empty();
 }
 
-bool chooses_levels(const RenderArgs &options) {
-  return options.max_surface_error ||
-         (options.time_budget && options.renderer_flags.pipeline != "blocks");
-}
-
 namespace {
 
 /// Checks --max-surface-error, --time-budget and the options that need them.

@@ -51,8 +51,6 @@ std::string default_image(const RenderArgs &options, std::size_t num_views);
 bool asks_for_output(const RenderArgs &options);
 /// Whether a picture is written.
 bool asks_for_picture(const RenderArgs &options);
-/// Whether levels of detail are chosen among those that the volume has.
-bool chooses_levels(const RenderArgs &options);
 
 /// Throws  Error: what can be told from the options alone
 void check_options(const CLI::App &command, const RenderArgs &options, const Team &team);

@@ -242,28 +242,38 @@ def detail(run):
     return rows
 
 
+# Ways to draw the largest volume, each of which takes its time to store.
+WAYS_OF_THE_LARGEST = (
+    "default,--samples 2,--samples 4,1/2 size,1/4 size,1/8 size,--voxel-pixels 1,--voxel-pixels 2,"
+    "--voxel-pixels 4,--voxel-pixels 1 --samples 2,--voxel-pixels 1 --samples 4,--time-budget 2,"
+    "--time-budget 5,--time-budget 10,--normals cell,--solver linear,BCMC"
+)
+
+
 def pareto(run):
     """A row for each volume: what `isowave bench pareto` writes of it."""
-    names = ("aneurism", "bonsai", "cthead", "isabel")
-    subjects = [(path, isovalues[1]) for path, isovalues in run.real_volumes(*names)]
-    options = {"size": "1280x720", "views": 3, "rounds": 5}
-    sweep = {"voxel_pixels": "0,1", "voxel_error": "0,0.04"}
+    subjects = [(path, isovalues[0], {}) for path, isovalues in run.real_volumes("LIDC2")]
+    subjects += [(path, isovalues[1], {}) for path, isovalues in run.real_volumes("bonsai")]
+    options = {"size": "1280x720", "views": 3, "rounds": 3}
     if run.options.quick:
-        options = {"size": "48x32", "views": 1, "rounds": 1, "pipeline": "rays"}
-        sweep["storage"] = "rate:4,tolerance:2"
+        options = {"size": "48x32", "views": 1, "rounds": 1}
+        options["ways"] = "default,--samples 2,1/2 size,--rate 2,--ambient 16,BCMC,--device host"
+    elif run.options.on_cpu:
+        options["size"] = "640x360"
+        subjects += [(f"generate:{field}_uint8", 128, {}) for field in CPU_VOLUMES]
     else:
-        largest = CPU_VOLUMES[0] if run.options.on_cpu else GPU_VOLUMES[0]
-        subjects.append((f"generate:{largest}_uint8", 128))
+        subjects += [(f"generate:{field}_uint8", 128, {}) for field in GPU_VOLUMES[:2]]
+        ways = {"ways": WAYS_OF_THE_LARGEST}
+        subjects.append((f"generate:{GPU_VOLUMES[3]}_uint8", 128, ways))
     rows = []
-    for volume, isovalue in subjects:
+    for volume, isovalue, more in subjects:
         run.run(
             "isowave",
             "bench",
             "pareto",
             volume,
             isovalue=isovalue,
-            **options,
-            **sweep,
+            **{**options, **more},
             device=run.options.device,
             json="o.json",
         )

@@ -6,6 +6,7 @@ import statistics
 
 from measuring import bricks, gpu_peers, paper_article, paper_tables
 from measuring.cells import mebibytes, ms, name_of, percent
+from measuring.fronts import front_of
 
 
 def option(row, name):
@@ -392,68 +393,51 @@ def solver_frames(rows):
         yield entries[0]["solver"], entries[0]["steps"], *cells
 
 
+def of_size(row):
+    """Such as "mixing layer 512^3, 128" of the volume and the isovalue."""
+    name, isovalue = subject(row).rsplit(", ", 1)
+    dims = row["dims"]
+    size = f"{dims[0]}^3" if len(set(dims)) == 1 else " x ".join(str(dim) for dim in dims)
+    return f"{name} {size}, {isovalue}"
+
+
+def way(point):
+    return f"`{point['way']}`" if point["way"].startswith("-") else point["way"]
+
+
 def pareto(rows):
+    """The fronts of time and error."""
     yield (
         "volume, isovalue",
-        "stored with",
-        "MB",
-        "ms cold",
-        "wrong pixels",
-        "depth p99, voxels",
-        "normals p99, degrees",
+        "way to draw",
+        "ms, next",
+        "ms, new",
         "FLIP",
+        "wrong pixels",
+        "MB to draw",
     )
     for row in rows:
-        for point in row["points"]:
-            if choice(point) != ("rays", "bernstein", 0, 0):
-                continue
+        for point in front_of(row["points"], "next_ms", "flip"):
             yield (
-                subject(row),
-                f"`--{point['storage'].replace(':', ' ')}`",
-                f"{point['bytes'] / 1e6:.3g}",
-                ms(point["ms"]),
-                f"{100 * point['wrong_pixels']:.2g} %",
-                f"{point['depth_p99']:.2g}",
-                f"{point['normal_p99']:.2g}",
+                of_size(row),
+                way(point),
+                ms(point["next_ms"]),
+                "" if point["cold_ms"] is None else ms(point["cold_ms"]),
                 f"{point['flip']:.4f}",
+                f"{100 * point['wrong_pixels']:.2g} %",
+                f"{point['memory_bytes'] / 1e6:,.0f}",
             )
 
 
-def choice(point):
-    """What distinguishes swept points of one volume and storage."""
-    return point["pipeline"], point["solver"], point["voxel_pixels"], point["voxel_error"]
-
-
-def ratios(points, changed, value, default):
-    """Median ratios of ms of the points that have the value beside those that have the default."""
-    swept = {(p["storage"], *choice(p)): p for p in points if p["max_surface_error"] is None}
-    found = []
-    for key, point in swept.items():
-        other = list(key)
-        other[changed] = default
-        if key[changed] == value and tuple(other) in swept:
-            found.append(point["ms"] / swept[tuple(other)]["ms"])
-    return f"{statistics.median(found):.2f}" if found else ""
-
-
-def pareto_times(rows):
-    yield (
-        "volume, isovalue",
-        "`blocks` / `rays`",
-        "`linear` / `bernstein`",
-        "`--voxel-error` / all planes",
-        "`--max-surface-error` / fastest point that is no worse",
-    )
-    for row in rows:
-        points = row["points"]
-        planes = max(p["voxel_error"] or 0 for p in points)
-        chosen = [p["over_front"] for p in points if p.get("over_front")]
+def pareto_ways(rows):
+    """Every way: ms of next frames and FLIP, a column for each volume."""
+    yield "way to draw", *(f"{of_size(row)}: ms, FLIP" for row in rows)
+    by_way = [{point["way"]: point for point in row["points"]} for row in rows]
+    for name in dict.fromkeys(name for points in by_way for name in points):
+        found = [points.get(name) for points in by_way]
         yield (
-            subject(row),
-            ratios(points, 1, "blocks", "rays"),
-            ratios(points, 2, "linear", "bernstein"),
-            ratios(points, 4, planes, 0),
-            f"{min(chosen):.2f} to {max(chosen):.2f}" if chosen else "",
+            way({"way": name}),
+            *(f"{ms(p['next_ms'])}, {p['flip']:.4f}" if p else "" for p in found),
         )
 
 
@@ -486,7 +470,7 @@ TABLES = {
         ("sizes", sizes),
         ("detail", detail),
         ("solvers", solvers, solver_frames),
-        ("pareto", pareto, pareto_times),
+        ("pareto", pareto, pareto_ways),
     )
     for table in tables
 }

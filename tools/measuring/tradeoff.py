@@ -1,0 +1,149 @@
+"""Charts of speed against accuracy: what `isowave bench pareto` writes, a panel for each volume.
+
+Every point is one way to draw. The front is what no other way beats in both; it is drawn and named.
+The rest is grey. Ways of other programs (peers) are blue and named.
+"""
+
+import matplotlib.pyplot as plt
+import matplotlib.ticker
+
+from measuring.fronts import front_of
+
+FRONT, OTHERS, PEERS = "#D55E00", "#BBBBBB", "#0072B2"
+TIMES = {
+    "next_ms": "ms from camera to picture, one degree further",
+    "cold_ms": "ms to the first picture of an isovalue",
+}
+ERRORS = {
+    "flip": "error (FLIP)",
+    "wrong_pixels": "wrong pixels, part of all",
+}
+
+
+def name_of(point):
+    """The name beside a point: options of `isowave render`, shortened."""
+    return point["way"].replace("--device host", "host").replace("--", "")
+
+
+def spread_names(axis, front, cost, error):
+    """Writes names at the lower left of the front, where no points can be, each below the last."""
+    height = axis.get_window_extent().height / axis.figure.dpi * 72
+    low, high = (axis.transScale.transform((1, y))[1] for y in axis.get_ylim())
+    last = None
+    for point in front:
+        at = (axis.transScale.transform((1, point[error]))[1] - low) / (high - low) * height
+        text_at = at - 3 if last is None else min(at - 3, last - 7)
+        last = text_at
+        axis.annotate(
+            name_of(point),
+            (point[cost], point[error]),
+            xytext=(-5, text_at - at),
+            textcoords="offset points",
+            fontsize=6.5,
+            ha="right",
+            va="center",
+            color=FRONT,
+        )
+
+
+def draw_panel(axis, document, cost, error, least):
+    """least: the error that points without any have, so that they have a place."""
+    points = [dict(point) for point in document["points"] if point[cost] is not None]
+    for point in points:
+        point[error] = max(point[error], least)
+    front = front_of(points, cost, error)
+    names = {point["way"] for point in front}
+    for point in points:
+        if point["is_peer"]:
+            axis.plot(point[cost], point[error], "s", color=PEERS, markersize=4, zorder=3)
+            if point["way"] not in names:
+                axis.annotate(
+                    name_of(point),
+                    (point[cost], point[error]),
+                    xytext=(4, 0),
+                    textcoords="offset points",
+                    fontsize=6,
+                    va="center",
+                    color=PEERS,
+                )
+        elif point["way"] not in names:
+            axis.plot(point[cost], point[error], "o", color=OTHERS, markersize=3)
+    axis.plot(
+        [point[cost] for point in front],
+        [point[error] for point in front],
+        color=FRONT,
+        linewidth=1,
+        zorder=2,
+    )
+    for point in front:
+        if not point["is_peer"]:
+            axis.plot(point[cost], point[error], "o", color=FRONT, markersize=4, zorder=4)
+    return front
+
+
+def plain(value, _=None):
+    return f"{value:g}"
+
+
+def draw(documents, stem, cost, error, save, caption):
+    """Writes one chart. cost, error: names of the axes' values in the points."""
+    values = [(p[cost], p[error]) for d in documents for p in d["points"] if p[cost] is not None]
+    positive = [y for _, y in values if y > 0]
+    least = min(positive, default=1) / 2
+    columns = min(2, len(documents))
+    rows = -(-len(documents) // columns)
+    size = (3.9 * columns + 0.3, 3.0 * rows + 0.9)
+    figure, axes = plt.subplots(
+        rows, columns, figsize=size, squeeze=False, sharex=True, sharey=True
+    )
+    for axis in axes.flat[len(documents) :]:
+        axis.remove()
+    axes.flat[0].set_xscale("log")
+    axes.flat[0].set_yscale("log")
+    costs = [x for x, _ in values]
+    axes.flat[0].set_xlim(min(costs) / 6, max(costs) * 2.5)
+    axes.flat[0].set_ylim(least / 1.5, 1.5 * max(positive, default=1))
+    figure.supxlabel(TIMES.get(cost, "MB of memory to draw"), fontsize=9, y=0.05)
+    figure.supylabel(
+        f"{ERRORS[error]}, against {documents[0]['truth_rays']} rays a pixel", fontsize=9
+    )
+    width, height = documents[0]["size"]
+    text = f"{caption(documents[0])}; {width} x {height}, medians of {documents[0]['views']} views"
+    figure.text(0.5, 0.012, text, ha="center", fontsize=6, color="#555555")
+    fronts = []
+    for axis, document in zip(axes.flat, documents):
+        axis.grid(True, which="major", color="#E5E5E5", linewidth=0.6)
+        axis.set_axisbelow(True)
+        axis.tick_params(labelsize=7, labelbottom=True)
+        axis.xaxis.set_major_formatter(matplotlib.ticker.FuncFormatter(plain))
+        axis.yaxis.set_major_formatter(matplotlib.ticker.FuncFormatter(plain))
+        axis.set_title(title_of(document), fontsize=9)
+        fronts.append((axis, draw_panel(axis, document, cost, error, least)))
+    figure.tight_layout(rect=(0.01, 0.06, 1, 1))
+    for axis, front in fronts:
+        spread_names(axis, front, cost, error)
+    save(figure, stem)
+
+
+def title_of(document):
+    name = document["volume"].rsplit("/", 1)[-1].removeprefix("generate:")
+    dims = document["dims"]
+    cube = f"{dims[0]}\u00b3" if len(set(dims)) == 1 else "x".join(str(dim) for dim in dims)
+    return f"{name.split('_')[0].split('.')[0]}, {cube}, isovalue {document['isovalue']:g}"
+
+
+def draw_all(documents, stem, save, caption):
+    """All charts of speed against accuracy, and of bytes."""
+    documents = [
+        {
+            **document,
+            "points": [
+                {**point, "memory_mb": point["memory_bytes"] / 1e6} for point in document["points"]
+            ],
+        }
+        for document in documents
+    ]
+    draw(documents, f"{stem}_pareto", "next_ms", "flip", save, caption)
+    draw(documents, f"{stem}_pareto_new", "cold_ms", "flip", save, caption)
+    draw(documents, f"{stem}_pareto_wrong", "next_ms", "wrong_pixels", save, caption)
+    draw(documents, f"{stem}_pareto_bytes", "memory_mb", "flip", save, caption)
