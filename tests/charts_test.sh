@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Small runs of `isowave bench solvers`, `isowave bench pareto` and `frame_bench --budgets`, and
+# Small runs of `isowave bench solvers`, `pareto` and `topology`, and of `frame_bench --budgets`;
 # tools/charts of them and of what is no such file.
 #   charts_test.sh PROGRAM [FRAME_BENCH]
 set -euo pipefail
@@ -105,6 +105,20 @@ for bad in "--ways full" "--ways default,,BCMC" "--size 0x3" "--views 0"; do
   fi
   [ "$(wc -l <"$work/error")" -eq 1 ] || fail "$bad: $(cat "$work/error")"
 done
+
+"$program" bench topology generate:turbulence_64x64x64_uint8 -i 128 --json "$work/parts.json" >"$work/out"
+"$top/tools/charts" "$work/parts.json" -o "$work"
+[ -s "$work/parts_topology.png" ] || fail "parts_topology.png is missing"
+/usr/bin/python3 - "$work/parts.json" <<'EOF'
+import json, sys
+document = json.load(open(sys.argv[1]))
+rows = {row["stored"]: row for row in document["rows"]}
+assert document["components"] > 0 and len(rows) >= 9, document
+coarse, fine = rows["level of detail 2"], rows["--rate 8"]
+assert coarse["lost"] > fine["lost"], "coarse levels lose more than many bits"
+EOF
+if "$program" bench topology "$work/none.raw" -i 40 2>"$work/error"; then fail "no volume"; fi
+[ "$(wc -l <"$work/error")" -eq 1 ] || fail "no volume: $(cat "$work/error")"
 
 [ -n "$frame_bench" ] || exit 0
 # sweep ARGUMENT...: a small volume at several budgets, to sweep.json.

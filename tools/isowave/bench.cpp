@@ -4,6 +4,7 @@
 #include "tools/isowave/bench_paper.hpp"
 #include "tools/isowave/bench_pareto.hpp"
 #include "tools/isowave/bench_solvers.hpp"
+#include "tools/isowave/bench_topology.hpp"
 #include "tools/isowave/commands.hpp"
 
 namespace isowave::core::tools {
@@ -14,6 +15,7 @@ void add_bench(CLI::App &app) {
   bench->require_subcommand(1);
   add_bench_solvers(*bench);
   add_bench_pareto(*bench);
+  add_bench_topology(*bench);
   add_bench_paper(*bench);
 }
 

@@ -281,6 +281,16 @@ def pareto(run):
     return rows
 
 
+def topology(run):
+    """A row for each volume: what `isowave bench topology` writes of it."""
+    names = ("aneurism", "bonsai", "LIDC2", "vessel")
+    rows = []
+    for volume, isovalues in run.real_volumes(*names):
+        run.run("isowave", "bench", "topology", volume, isovalue=isovalues[1], json="t.json")
+        rows.append(what_was_measured(run.read_json("t.json")))
+    return rows
+
+
 def solvers(run):
     """One row: what `isowave bench solvers` writes."""
     names = ("aneurism", "bonsai", "engine", "cthead")

@@ -1,4 +1,4 @@
-"""What no other way to draw beats: fronts of `isowave bench pareto`."""
+"""What charts and tables of `isowave bench` share: fronts, and names of volumes."""
 
 # A point is on the front if it has less of the error than all cheaper ones, by this factor at
 # least: points beside each other would hide each other's names.
@@ -15,3 +15,13 @@ def front_of(points, cost, error):
         if not front or point[error] < LEAST_GAIN * front[-1][error]:
             front.append(point)
     return front
+
+
+def volume_title(document):
+    """Such as "bonsai, 256\u00b3, isovalue 40"."""
+    name = document["volume"].rsplit("/", 1)[-1].removeprefix("generate:")
+    for end in ("_", "."):
+        name = name.split(end + str(document["dims"][0]))[0].split(".")[0]
+    dims = document["dims"]
+    size = f"{dims[0]}\u00b3" if len(set(dims)) == 1 else "x".join(str(dim) for dim in dims)
+    return f"{name.replace('_', ' ')}, {size}, isovalue {document['isovalue']:g}"

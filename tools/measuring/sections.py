@@ -33,9 +33,10 @@ SECTIONS = {
         accuracy.detail,
         accuracy.solvers,
         accuracy.pareto,
+        accuracy.topology,
     )
 }
-NEED_VOLUMES = ("bits", "oracles", "certified", "sizes", "detail", "solvers", "pareto")
+NEED_VOLUMES = ("bits", "oracles", "certified", "sizes", "detail", "solvers", "pareto", "topology")
 # What some need beside isowave, frame_bench and isowave_bench: built only with VTK, with CUDA, with
 # MPI, or with tests.
 PROGRAMS = {

@@ -441,6 +441,35 @@ def pareto_ways(rows):
         )
 
 
+def topology(rows):
+    yield (
+        "volume, isovalue",
+        "stored",
+        "components",
+        "Euler's characteristic",
+        "lost (large)",
+        "false (large)",
+    )
+    for row in rows:
+        yield (
+            of_size(row),
+            "lossless",
+            f"{row['components']:,} ({row['large']})",
+            f"{row['euler']:,}",
+            "",
+            "",
+        )
+        for stored in row["rows"]:
+            yield (
+                "",
+                f"`{stored['stored']}`" if stored["stored"].startswith("-") else stored["stored"],
+                f"{stored['components']:,}",
+                f"{stored['euler']:,}",
+                f"{stored['lost']:,} ({stored['lost_large']})",
+                f"{stored['false']:,} ({stored['false_large']})",
+            )
+
+
 # Name of a table -> (section of the JSON, table). `front` is the front page's, of the same frames.
 TABLES = {
     table.__name__: (section, table)
@@ -471,6 +500,7 @@ TABLES = {
         ("detail", detail),
         ("solvers", solvers, solver_frames),
         ("pareto", pareto, pareto_ways),
+        ("topology", topology),
     )
     for table in tables
 }

@@ -7,7 +7,7 @@ The rest is grey. Ways of other programs (peers) are blue and named.
 import matplotlib.pyplot as plt
 import matplotlib.ticker
 
-from measuring.fronts import front_of
+from measuring.fronts import front_of, volume_title
 
 FRONT, OTHERS, PEERS = "#D55E00", "#BBBBBB", "#0072B2"
 TIMES = {
@@ -117,19 +117,12 @@ def draw(documents, stem, cost, error, save, caption):
         axis.tick_params(labelsize=7, labelbottom=True)
         axis.xaxis.set_major_formatter(matplotlib.ticker.FuncFormatter(plain))
         axis.yaxis.set_major_formatter(matplotlib.ticker.FuncFormatter(plain))
-        axis.set_title(title_of(document), fontsize=9)
+        axis.set_title(volume_title(document), fontsize=9)
         fronts.append((axis, draw_panel(axis, document, cost, error, least)))
     figure.tight_layout(rect=(0.01, 0.06, 1, 1))
     for axis, front in fronts:
         spread_names(axis, front, cost, error)
     save(figure, stem)
-
-
-def title_of(document):
-    name = document["volume"].rsplit("/", 1)[-1].removeprefix("generate:")
-    dims = document["dims"]
-    cube = f"{dims[0]}\u00b3" if len(set(dims)) == 1 else "x".join(str(dim) for dim in dims)
-    return f"{name.split('_')[0].split('.')[0]}, {cube}, isovalue {document['isovalue']:g}"
 
 
 def draw_all(documents, stem, save, caption):
