@@ -106,7 +106,7 @@ for bad in "--ways full" "--ways default,,BCMC" "--size 0x3" "--views 0"; do
   [ "$(wc -l <"$work/error")" -eq 1 ] || fail "$bad: $(cat "$work/error")"
 done
 
-"$program" bench topology generate:turbulence_64x64x64_uint8 -i 128 --json "$work/parts.json" >"$work/out"
+"$program" bench topology generate:noisy_scan_64x64x64_uint8 -i 128 --json "$work/parts.json" >"$work/out"
 "$top/tools/charts" "$work/parts.json" -o "$work"
 [ -s "$work/parts_topology.png" ] || fail "parts_topology.png is missing"
 /usr/bin/python3 - "$work/parts.json" <<'EOF'
@@ -114,7 +114,7 @@ import json, sys
 document = json.load(open(sys.argv[1]))
 rows = {row["stored"]: row for row in document["rows"]}
 assert document["components"] > 0 and len(rows) >= 9, document
-coarse, fine = rows["level of detail 2"], rows["--rate 8"]
+coarse, fine = rows["level of detail 1"], rows["--rate 8"]
 assert coarse["lost"] > fine["lost"], "coarse levels lose more than many bits"
 EOF
 if "$program" bench topology "$work/none.raw" -i 40 2>"$work/error"; then fail "no volume"; fi
