@@ -3,6 +3,9 @@
 // change of inside := f >= isovalue of the trilinear field.
 //
 //   gpu_peer generate:mixing_layer_512x512x512_uint8 --isovalue 128 --json peers.json
+//
+// With --pictures, all draw with smooth normals, and their pictures are written instead of
+// compared.
 
 #include <fmt/format.h>
 
@@ -14,6 +17,7 @@
 #include <string>
 #include <vector>
 
+#include "bench/gpu_peer/pictures.hpp"
 #include "bench/gpu_peer/turns.hpp"
 #include "bench/run_info.hpp"
 #include "core/base/error.hpp"
@@ -32,7 +36,8 @@ namespace {
 using nlohmann::ordered_json;
 
 struct Options {
-  std::string volume, device, json;
+  std::string volume, device, json, pictures;
+  std::vector<std::string> peers;
   tools::VolumeOptions volume_options;
   float isovalue = 0;
   std::vector<std::uint32_t> size = {1280, 720};
@@ -40,6 +45,11 @@ struct Options {
   std::optional<float> max_error;
   bool on_host = false;
 };
+
+const std::vector<std::string> kPeers = {
+    "texture_uint8",      "texture_float",       "nanovdb_float_bits", "nanovdb_float_ranges",
+    "nanovdb_fpn_bits",   "nanovdb_fpn_ranges",  "nanovdb_fp8_bits",   "nanovdb_fp8_ranges",
+    "nanovdb_uint8_bits", "nanovdb_uint8_ranges"};
 
 VoxelsInMemory read_voxels(const Options &options, const ocl::DeviceInfo &device) {
   const auto reader = open_any_volume(options.volume, tools::to_overrides(options.volume_options),
@@ -68,9 +78,15 @@ std::vector<NamedSide> make_peers(const Options &options, const VoxelsInMemory &
       {dims.x, dims.y, dims.z}, voxels.values, voxels.info.type == VoxelType::kUint8};
   const Place place = options.on_host ? Place::kHost : Place::kDevice;
   const std::uint64_t pixels = std::uint64_t{options.size.at(0)} * options.size.at(1);
-  std::vector<NamedSide> peers = make_texture_sides(place, volume, pixels);
-  for (NamedSide &side : make_nanovdb_sides(place, volume, pixels, max_error_of(options, voxels)))
+  std::vector<NamedSide> peers = make_texture_sides(place, volume, pixels, options.peers);
+  for (NamedSide &side :
+       make_nanovdb_sides(place, volume, pixels, max_error_of(options, voxels), options.peers))
     peers.push_back(std::move(side));
+  for (const std::string &name : options.peers) {
+    if (std::ranges::find(peers, name, &NamedSide::name) == peers.end())
+      throw Error("--peers {}: only of volumes of uint8, not of {}", name,
+                  to_string(voxels.info.type));
+  }
   return peers;
 }
 
@@ -121,6 +137,27 @@ void print_sides(const std::vector<SideResult> &sides) {
       "voxels.\n");
 }
 
+/// Compares the sides, or has them write their pictures. Adds to the JSON what was measured.
+void draw(const Options &options, std::vector<std::unique_ptr<IsowaveSide>> &isowave,
+          std::vector<NamedSide> &peers, const VolumeInfo &info, const Views &views,
+          ordered_json &json) {
+  if (options.pictures.empty()) {
+    const std::vector<SideResult> sides = draw_in_turns(isowave, peers, info, views);
+    for (const SideResult &side : sides) json["sides"].push_back(side_json(side));
+    print_sides(sides);
+    return;
+  }
+  const PictureWork work{.folder = options.pictures,
+                         .volume = options.volume,
+                         .isovalue = views.isovalue,
+                         .size = views.size,
+                         .views = options.orbit,
+                         .rounds = views.rounds};
+  const std::vector<PeerPictures> sides = draw_pictures(isowave, peers, info, views, work);
+  for (const PeerPictures &side : sides) json["pareto_peers"].push_back(to_json(side, work));
+  print_pictures(sides, work);
+}
+
 void compare(const Options &options, const std::string &command) {
   const ocl::DeviceInfo device_info = ocl::choose_device(options.device);
   const std::optional<GpuInfo> gpu =
@@ -158,9 +195,7 @@ void compare(const Options &options, const std::string &command) {
   fmt::print("{}\n", command);
   for (const auto &[name, value] : json.at("context").items())
     fmt::print("  {:<16}{}\n", name, value.dump());
-  const std::vector<SideResult> sides = draw_in_turns(isowave, peers, voxels.info, views);
-  for (const SideResult &side : sides) json["sides"].push_back(side_json(side));
-  print_sides(sides);
+  draw(options, isowave, peers, voxels.info, views, json);
   if (!options.json.empty()) tools::write_json(json, options.json);
 }
 
@@ -179,12 +214,18 @@ void add_options(CLI::App &app, Options &options) {
   app.add_option("--size", options.size, "picture size WxH [1280x720]")
       ->delimiter('x')
       ->expected(2);
-  app.add_option("--orbit", options.orbit, "views around the volume")
+  app.add_option("--orbit,--views", options.orbit, "views around the volume")
       ->check(CLI::Range(1u, 100000u))
       ->capture_default_str();
   app.add_option("--rounds", options.rounds, "times that every view is drawn")
       ->check(CLI::Range(1u, 100000u))
       ->capture_default_str();
+  app.add_option("--peers", options.peers, fmt::format("{} [all]", fmt::join(kPeers, ", ")))
+      ->delimiter(',')
+      ->check(CLI::IsMember(kPeers));
+  app.add_option("--pictures", options.pictures,
+                 "write each side's picture of each view, with smooth normals, as SIDE_VIEW.png to "
+                 "this folder, and time these pictures alone: pareto_peers of --json");
   app.add_option("--device", options.device,
                  "isowave's OpenCL device: the GPU that CUDA takes [ISOWAVE_DEVICE, or the first "
                  "GPU]");
@@ -207,6 +248,7 @@ int main(int argc, char **argv) {
     tools::Outputs outputs;
     outputs.read_volume(options.volume);
     outputs.write("--json", options.json);
+    bench::check_folder(outputs, options.pictures);
     bench::compare(options, fmt::format("{}", fmt::join(argv, argv + argc, " ")));
   });
   return tools::run_program(app, argc, argv);

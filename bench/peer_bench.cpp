@@ -3,6 +3,8 @@
 // in turns.
 //
 //   peer_bench [--dims 256 512] [--rounds 5] [--isovalues 126,128,130] --json peer.json
+//
+// With --pictures, all draw views of one isovalue with smooth normals, and write their pictures.
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -27,6 +29,7 @@
 #include <utility>
 #include <vector>
 
+#include "bench/peer_pictures.hpp"
 #include "bench/peer_sides.hpp"
 #include "bench/run_info.hpp"
 #include "core/base/error.hpp"
@@ -45,15 +48,31 @@ using nlohmann::ordered_json;
 
 struct Options {
   std::vector<std::uint32_t> dims = {256, 512};
-  std::string volume, device, json;
+  std::string volume, device, json, pictures;
   std::string side;  ///< of a child process
   std::vector<std::string> sides;
-  std::uint32_t rate = 4, rounds = 5, views = 100;
+  std::optional<std::uint32_t> rate;
+  std::uint32_t rounds = 5, views = 100;
   std::vector<float> isovalues = {126, 128, 130};
+  float isovalue = 0;  ///< of pictures
   std::vector<std::uint32_t> size = {1280, 720};
+
+  /// Bits per voxel; none: without loss.
+  std::optional<std::uint32_t> storage_rate() const {
+    return rate || !pictures.empty() ? rate : std::optional(4u);
+  }
+  ImageSize image_size() const { return {size.at(0), size.at(1)}; }
 };
 
 const std::vector<std::string> kSides = {"host", "rays", "blocks", "mesh_low", "mesh_medium"};
+
+/// Their names in charts.
+const std::map<std::string, std::string> kNames = {
+    {"host", "isowave, host"},
+    {"rays", "isowave, rays"},
+    {"blocks", "isowave, blocks"},
+    {"mesh_low", "Flying Edges + Embree"},
+    {"mesh_medium", "Flying Edges + Embree, better tree"}};
 
 /// Pages of files in this process's memory, as code of libraries [bytes]: RssFile of
 /// /proc/self/status.
@@ -68,33 +87,57 @@ std::uint64_t memory_of_files() {
 // ---- a child: reads an isovalue a line, and of how many views; answers a line of JSON
 
 std::unique_ptr<PeerSide> make_side(const Options &options, CompressedVolume volume) {
-  const Camera camera = orbit_cameras(volume.info, 1)[0];
-  const ImageSize size{options.size.at(0), options.size.at(1)};
+  const PeerFrames frames{options.image_size(),
+                          options.pictures.empty() ? Normals::kCell : Normals::kSmooth};
   if (options.side.starts_with("mesh"))
-    return make_mesh_side(std::move(volume), camera, size, options.side == "mesh_medium");
-  if (options.side == "host") return make_host_side(std::move(volume), camera, size);
-  return make_renderer_side(std::move(volume), camera, size,
+    return make_mesh_side(std::move(volume), frames, options.side == "mesh_medium");
+  if (options.side == "host") return make_host_side(std::move(volume), frames);
+  return make_renderer_side(std::move(volume), frames,
                             options.side == "rays" ? rays_pipeline() : blocks_pipeline(),
                             options.device);
 }
 
+/// Draws a view, and sends what was measured.
+void draw_and_answer(PeerSide &side, float isovalue, const Camera &camera, Image8 *picture) {
+  Measured measured = side.draw(isovalue, camera, picture);
+  measured["peak_byte_count"] = static_cast<double>(peak_memory());
+  measured["file_byte_count"] = static_cast<double>(memory_of_files());
+  std::cout << ordered_json(measured).dump() << std::endl;
+}
+
+/// Views, each by its number, of an isovalue. A view's picture is written when it is drawn first.
+void serve_pictures(const Options &options, const VolumeInfo &info, PeerSide &side) {
+  const std::vector<Camera> cameras = orbit_cameras(info, options.views);
+  std::vector<Image8> pictures(cameras.size());
+  float isovalue = 0;
+  for (std::uint32_t view = 0; std::cin >> isovalue >> view;) {
+    Image8 &picture = pictures.at(view);
+    if (!picture.pixels.empty()) {
+      draw_and_answer(side, isovalue, cameras[view], nullptr);
+      continue;
+    }
+    draw_and_answer(side, isovalue, cameras[view], &picture);
+    write_png(picture, picture_path(options.pictures, options.side, view));
+  }
+}
+
 void serve(const Options &options) {
-  CompressedVolume volume = tools::load_volume(options.volume, {}, {.rate = options.rate});
+  CompressedVolume volume =
+      tools::load_volume(options.volume, {}, {.rate = options.storage_rate()});
   const VolumeInfo info = volume.info;
   const auto side = make_side(options, std::move(volume));
   reset_peak_memory();             // loading the volume does not count
   std::cout << "{}" << std::endl;  // ready
+  if (!options.pictures.empty()) return serve_pictures(options, info, *side);
+  const Camera camera = orbit_cameras(info, 1)[0];
   float isovalue = 0;
   for (std::uint32_t views = 0; std::cin >> isovalue >> views;) {
-    if (views > 0) {
-      const auto cameras = orbit_cameras(info, views);
-      std::cout << ordered_json(side->draw_views(isovalue, cameras)).dump() << std::endl;
+    if (views == 0) {
+      draw_and_answer(*side, isovalue, camera, nullptr);
       continue;
     }
-    Measured measured = side->draw(isovalue);
-    measured["peak_byte_count"] = static_cast<double>(peak_memory());
-    measured["file_byte_count"] = static_cast<double>(memory_of_files());
-    std::cout << ordered_json(measured).dump() << std::endl;
+    const auto cameras = orbit_cameras(info, views);
+    std::cout << ordered_json(side->draw_views(isovalue, cameras)).dump() << std::endl;
   }
 }
 
@@ -144,14 +187,17 @@ class Child {
     return nlohmann::json::parse(line);
   }
 
-  Measured draw(float isovalue) { return ask(isovalue, 0).get<Measured>(); }
+  /// view: of pictures alone
+  Measured draw(float isovalue, std::uint32_t view = 0) {
+    return ask(isovalue, view).get<Measured>();
+  }
   std::vector<double> draw_views(float isovalue, std::uint32_t views) {
     return ask(isovalue, views).get<std::vector<double>>();
   }
 
  private:
-  nlohmann::json ask(float isovalue, std::uint32_t views) {
-    fmt::print(out_, "{} {}\n", isovalue, views);
+  nlohmann::json ask(float isovalue, std::uint32_t views_or_view) {
+    fmt::print(out_, "{} {}\n", isovalue, views_or_view);
     std::fflush(out_);
     return answer();
   }
@@ -203,29 +249,40 @@ ordered_json measure_views(const Options &options,
   return json;
 }
 
+/// A process for each side.
+std::vector<std::unique_ptr<Child>> start_sides(const Options &options, const std::string &program,
+                                                const std::string &volume) {
+  std::vector<std::unique_ptr<Child>> children;
+  for (const std::string &side : options.sides) {
+    std::vector<std::string> arguments = {
+        "--side",   side,
+        "--volume", volume,
+        "--device", options.device,
+        "--views",  std::to_string(options.views),
+        "--size",   fmt::format("{}x{}", options.size.at(0), options.size.at(1))};
+    if (options.rate) arguments.insert(arguments.end(), {"--rate", std::to_string(*options.rate)});
+    if (!options.pictures.empty())
+      arguments.insert(arguments.end(), {"--pictures", options.pictures, "--isovalue",
+                                         fmt::format("{}", options.isovalue)});
+    // A process in which PoCL compiles kernels keeps memory for that.
+    if (side == "rays" || side == "blocks") {
+      Child compiles(program, arguments);
+      compiles.answer();
+      compiles.draw(options.pictures.empty() ? options.isovalues.at(0) : options.isovalue);
+    }
+    children.push_back(std::make_unique<Child>(program, arguments));
+    children.back()->answer();
+  }
+  return children;
+}
+
 /// One size: rounds x isovalues, in turns that change their order. The first turn of each isovalue
 /// is not counted.
 ordered_json measure(const Options &options, const std::string &program,
                      const std::string &volume) {
   const std::vector<std::string> &sides = options.sides;
-  std::vector<std::unique_ptr<Child>> children(sides.size());
   const auto load_before = load_average();
-  for (std::size_t side = 0; side < sides.size(); ++side) {
-    const std::vector<std::string> arguments = {
-        "--side",   sides[side],
-        "--volume", volume,
-        "--device", options.device,
-        "--rate",   std::to_string(options.rate),
-        "--size",   fmt::format("{}x{}", options.size.at(0), options.size.at(1))};
-    // A process in which PoCL compiles kernels keeps memory for that.
-    if (sides[side] == "rays" || sides[side] == "blocks") {
-      Child compiles(program, arguments);
-      compiles.answer();
-      compiles.draw(options.isovalues.at(0));
-    }
-    children[side] = std::make_unique<Child>(program, arguments);
-    children[side]->answer();
-  }
+  const std::vector<std::unique_ptr<Child>> children = start_sides(options, program, volume);
   std::vector<Samples> samples(sides.size());
   std::size_t turn = 0;
   for (std::uint32_t round = 0; round <= options.rounds; ++round) {
@@ -253,6 +310,41 @@ ordered_json measure(const Options &options, const std::string &program,
   }
   if (options.views > 0) json["views"] = measure_views(options, children);
   json["load_average_after"] = load_average();
+  return json;
+}
+
+/// The pictures of all sides, view by view in turns. The first round is not counted.
+ordered_json draw_pictures(const Options &options, const std::string &program) {
+  const PictureWork work{.folder = options.pictures,
+                         .volume = options.volume,
+                         .isovalue = options.isovalue,
+                         .size = options.image_size(),
+                         .views = options.views,
+                         .rounds = options.rounds};
+  const auto children = start_sides(options, program, options.volume);
+  const std::size_t count = children.size();
+  std::vector<PeerPictures> results;
+  for (const std::string &side : options.sides)
+    results.push_back({.side = side, .name = kNames.at(side)});
+  for (std::uint32_t round = 0; round <= work.rounds; ++round) {
+    for (std::uint32_t view = 0; view < work.views; ++view) {
+      for (std::size_t i = 0; i < count; ++i) {
+        const std::size_t side = (round + view + i) % count;
+        const Measured measured = children[side]->draw(work.isovalue, view);
+        PeerPictures &result = results[side];
+        const bool on_device = measured.contains("device_byte_count");
+        result.bytes = static_cast<std::uint64_t>(
+            measured.at(on_device ? "device_byte_count" : "peak_byte_count"));
+        if (round == 0) continue;
+        result.ms["cold"].push_back(measured.at("new_ms"));
+        result.ms["next"].push_back(measured.at("next_ms"));
+        result.ms["warm"].push_back(measured.at("warm_ms"));
+      }
+    }
+  }
+  ordered_json json = ordered_json::array();
+  for (const PeerPictures &side : results) json.push_back(to_json(side, work));
+  print_pictures(results, work);
   return json;
 }
 
@@ -322,17 +414,8 @@ void print_views(const ordered_json &views) {
   }
 }
 
-void compare(const Options &options, const std::string &command, const std::string &program) {
-  ocl::Device device(ocl::choose_device(options.device));
-  ordered_json json = {{"program", "peer_bench"}, {"command", command}, {"date", utc_now()}};
-  for (const auto &[name, value] : run_info(device)) json["context"][name] = value;
-  json["context"]["processors"] = std::thread::hardware_concurrency();
-  json["options"] = {{"rate", options.rate},        {"isovalues", options.isovalues},
-                     {"rounds", options.rounds},    {"views", options.views},
-                     {"width", options.size.at(0)}, {"height", options.size.at(1)}};
-  fmt::print("{}\n", command);
-  for (const auto &[name, value] : json.at("context").items())
-    fmt::print("  {:<16}{}\n", name, value.dump());
+/// Volumes of all sizes.
+void compare(const Options &options, const std::string &program, ordered_json &json) {
   std::vector<std::string> volumes;
   if (!options.volume.empty()) volumes.push_back(options.volume);
   for (const std::uint32_t n :
@@ -355,6 +438,29 @@ void compare(const Options &options, const std::string &command, const std::stri
       "of\n"
       "others hardly changes; peak: memory of the side's process, without what loading the volume\n"
       "took; views: the first one from the new isovalue on.\n");
+}
+
+void run(const Options &options, const std::string &command, const std::string &program) {
+  ocl::Device device(ocl::choose_device(options.device));
+  ordered_json json = {{"program", "peer_bench"}, {"command", command}, {"date", utc_now()}};
+  for (const auto &[name, value] : run_info(device)) json["context"][name] = value;
+  json["context"]["processors"] = std::thread::hardware_concurrency();
+  const auto rate = options.storage_rate();
+  json["options"] = {{"rate", rate ? ordered_json(*rate) : nullptr},
+                     {"rounds", options.rounds},
+                     {"views", options.views},
+                     {"width", options.size.at(0)},
+                     {"height", options.size.at(1)}};
+  const bool draws = !options.pictures.empty();
+  json["options"]["isovalues"] = draws ? std::vector{options.isovalue} : options.isovalues;
+  fmt::print("{}\n", command);
+  for (const auto &[name, value] : json.at("context").items())
+    fmt::print("  {:<16}{}\n", name, value.dump());
+  if (draws) {
+    json["pareto_peers"] = draw_pictures(options, program);
+  } else {
+    compare(options, program, json);
+  }
   if (!options.json.empty()) tools::write_json(json, options.json);
 }
 
@@ -366,17 +472,31 @@ void check_options(const CLI::App &app, const Options &options) {
   tools::Outputs outputs;
   outputs.read_volume(options.volume);
   outputs.write("--json", options.json);
+  check_folder(outputs, options.pictures);
+  if (!options.pictures.empty() && options.views == 0)
+    throw Error("--views 0: --pictures needs at least one view");
 }
 
 void add_options(CLI::App &app, Options &options) {
   app.add_option("--dims", options.dims, "edges of the mixing layers [256 512]");
-  app.add_option("--volume", options.volume,
-                 "this volume instead: a .zfp file, or " + std::string(tools::kVolumeHelp));
-  app.add_option("--isovalues", options.isovalues,
-                 "isovalues drawn in turn, at least two [126 128 130]")
-      ->delimiter(',')
-      ->expected(2, 1000);
-  app.add_option("--rate", options.rate, "bits per voxel")->capture_default_str();
+  CLI::Option *volume =
+      app.add_option("--volume", options.volume,
+                     "this volume instead: a .zfp file, or " + std::string(tools::kVolumeHelp));
+  CLI::Option *isovalues = app.add_option("--isovalues", options.isovalues,
+                                          "isovalues drawn in turn, at least two [126 128 130]")
+                               ->delimiter(',')
+                               ->expected(2, 1000);
+  CLI::Option *isovalue = app.add_option("--isovalue", options.isovalue, "isovalue of --pictures")
+                              ->check(tools::fits_float32())
+                              ->excludes(isovalues);
+  CLI::Option *pictures = app.add_option(
+      "--pictures", options.pictures,
+      "write each side's picture of each view of --isovalue, with smooth normals, as SIDE_VIEW.png "
+      "to this folder, and time these pictures alone: pareto_peers of --json");
+  pictures->needs(volume)->needs(isovalue);
+  isovalue->needs(pictures);
+  app.add_option("--rate", options.rate, "bits per voxel [4; with --pictures, without loss]")
+      ->check(CLI::Range(1u, 32u));
   app.add_option("--rounds", options.rounds,
                  "times that every isovalue is drawn, after one that is not counted")
       ->check(CLI::Range(1u, 100000u))
@@ -410,8 +530,8 @@ int main(int argc, char **argv) {
     if (options.sides.empty()) options.sides = isowave::core::bench::kSides;
     if (options.side.empty()) {
       isowave::core::bench::check_options(app, options);
-      isowave::core::bench::compare(options, fmt::format("{}", fmt::join(argv, argv + argc, " ")),
-                                    argv[0]);
+      isowave::core::bench::run(options, fmt::format("{}", fmt::join(argv, argv + argc, " ")),
+                                argv[0]);
     } else {
       isowave::core::bench::serve(options);
     }

@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "core/frame/normals.hpp"
+#include "core/io/png.hpp"
 #include "core/render/pipeline.hpp"
 #include "core/view/camera.hpp"
 #include "core/view/frame.hpp"
@@ -48,30 +50,38 @@ class Stopwatch {
 class PeerSide {
  public:
   virtual ~PeerSide() = default;
-  /// Draws the view at an isovalue that is not the last one's, and further frames of it. new_ms:
-  /// from the isovalue to the picture in the host's memory; warm_ms: the same view again; next_ms:
-  /// then one degree further; hit_count; and the side's own.
-  virtual Measured draw(float isovalue) = 0;
+  /// Draws a view at an isovalue for which nothing is extracted or decoded, and further frames of
+  /// it. new_ms: from the isovalue to the picture in the host's memory; warm_ms: the same view
+  /// again; next_ms: then one degree further; hit_count; and the side's own.
+  ///
+  /// picture  the view's, RGB; null: it is not wanted
+  virtual Measured draw(float isovalue, const Camera &camera, Image8 *picture) = 0;
   /// Draws views of an isovalue one after the other. Returns the ms of each: of the first one from
   /// the isovalue, with nothing decoded, to the picture.
   virtual std::vector<double> draw_views(float isovalue, const std::vector<Camera> &cameras) = 0;
 };
 
+/// What all sides draw.
+struct PeerFrames {
+  ImageSize size;
+  /// kCell: our frames have the normals of cells; a mesh has those of its triangles, lit from the
+  /// eye. kSmooth: all are shaded as our pictures; a mesh interpolates VTK's normals of vertices.
+  Normals normals = Normals::kCell;
+};
+
 /// Triangles of VTK's Flying Edges, Embree's tree over them, and its rays: threads on all
 /// processors. new_ms = extract_ms + build_ms + trace_ms. medium_quality: of Embree's tree, instead
 /// of low.
-std::unique_ptr<PeerSide> make_mesh_side(CompressedVolume volume, const Camera &camera,
-                                         ImageSize size, bool medium_quality);
+std::unique_ptr<PeerSide> make_mesh_side(CompressedVolume volume, const PeerFrames &frames,
+                                         bool medium_quality);
 
 /// Our renderer on the device that is chosen. new_ms: with nothing decoded; new_kept_ms: with the
 /// cache as the isovalue before left it.
-std::unique_ptr<PeerSide> make_renderer_side(CompressedVolume volume, const Camera &camera,
-                                             ImageSize size, PipelinePtr pipeline,
-                                             const std::string &device);
+std::unique_ptr<PeerSide> make_renderer_side(CompressedVolume volume, const PeerFrames &frames,
+                                             PipelinePtr pipeline, const std::string &device);
 
 /// Our renderer without OpenCL, on all processors: new_ms and new_kept_ms as above. open_ms: the
 /// value ranges of the volume's blocks, once.
-std::unique_ptr<PeerSide> make_host_side(CompressedVolume volume, const Camera &camera,
-                                         ImageSize size);
+std::unique_ptr<PeerSide> make_host_side(CompressedVolume volume, const PeerFrames &frames);
 
 }  // namespace isowave::core::bench

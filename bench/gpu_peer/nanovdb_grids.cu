@@ -141,28 +141,42 @@ class NanoStorage {
   double build_ms_ = 0, max_voxel_error_ = 0;
 };
 
+/// What each kind of grid is made for.
+struct GridWork {
+  Place place;
+  const GridVolume &volume;
+  std::uint64_t max_pixels;
+  float max_error;
+  const WantedSides &wanted;
+};
+
 template <class Build, class Value = float>
-void add_sides(std::vector<NamedSide> &sides, Place place, const GridVolume &volume,
-               std::uint64_t max_pixels, float max_error, const std::string &name) {
+void add_sides(std::vector<NamedSide> &sides, const GridWork &work, const std::string &name) {
   using Storage = NanoStorage<Build, Value>;
-  const auto storage = std::make_shared<const Storage>(place, volume, max_error);
-  sides.push_back({name + "_bits", std::make_unique<WalkedSide<Storage, true>>(
-                                       place, storage, volume, max_pixels)});
-  sides.push_back({name + "_ranges", std::make_unique<WalkedSide<Storage, false>>(
-                                         place, storage, volume, max_pixels)});
+  const std::string bits = name + "_bits", ranges = name + "_ranges";
+  if (!is_wanted(work.wanted, bits) && !is_wanted(work.wanted, ranges)) return;
+  const auto storage = std::make_shared<const Storage>(work.place, work.volume, work.max_error);
+  if (is_wanted(work.wanted, bits)) {
+    sides.push_back({bits, std::make_unique<WalkedSide<Storage, true>>(
+                               work.place, storage, work.volume, work.max_pixels)});
+  }
+  if (is_wanted(work.wanted, ranges)) {
+    sides.push_back({ranges, std::make_unique<WalkedSide<Storage, false>>(
+                                 work.place, storage, work.volume, work.max_pixels)});
+  }
 }
 
 }  // namespace
 
 std::vector<NamedSide> make_nanovdb_sides(Place place, const GridVolume &volume,
-                                          std::uint64_t max_pixels, float max_error) {
+                                          std::uint64_t max_pixels, float max_error,
+                                          const WantedSides &wanted) {
+  const GridWork work{place, volume, max_pixels, max_error, wanted};
   std::vector<NamedSide> sides;
-  add_sides<float>(sides, place, volume, max_pixels, max_error, "nanovdb_float");
-  add_sides<nanovdb::FpN>(sides, place, volume, max_pixels, max_error, "nanovdb_fpn");
-  add_sides<nanovdb::Fp8>(sides, place, volume, max_pixels, max_error, "nanovdb_fp8");
-  if (!volume.is_uint8) return sides;
-  add_sides<std::uint8_t, std::uint8_t>(sides, place, volume, max_pixels, max_error,
-                                        "nanovdb_uint8");
+  add_sides<float>(sides, work, "nanovdb_float");
+  add_sides<nanovdb::FpN>(sides, work, "nanovdb_fpn");
+  add_sides<nanovdb::Fp8>(sides, work, "nanovdb_fp8");
+  if (volume.is_uint8) add_sides<std::uint8_t, std::uint8_t>(sides, work, "nanovdb_uint8");
   return sides;
 }
 

@@ -104,21 +104,22 @@ class DenseStorage {
 };
 
 template <class T>
-NamedSide texture_side(Place place, const GridVolume &volume, std::uint64_t max_pixels,
-                       const char *name) {
+void add_side(std::vector<NamedSide> &sides, Place place, const GridVolume &volume,
+              std::uint64_t max_pixels, const WantedSides &wanted, const std::string &name) {
   using Storage = DenseStorage<T>;
-  return {name, std::make_unique<WalkedSide<Storage, false>>(
-                    place, std::make_shared<Storage>(place, volume), volume, max_pixels)};
+  if (!is_wanted(wanted, name)) return;
+  sides.push_back({name, std::make_unique<WalkedSide<Storage, false>>(
+                             place, std::make_shared<Storage>(place, volume), volume, max_pixels)});
 }
 
 }  // namespace
 
 std::vector<NamedSide> make_texture_sides(Place place, const GridVolume &volume,
-                                          std::uint64_t max_pixels) {
+                                          std::uint64_t max_pixels, const WantedSides &wanted) {
   std::vector<NamedSide> sides;
   if (volume.is_uint8)
-    sides.push_back(texture_side<std::uint8_t>(place, volume, max_pixels, "texture_uint8"));
-  sides.push_back(texture_side<float>(place, volume, max_pixels, "texture_float"));
+    add_side<std::uint8_t>(sides, place, volume, max_pixels, wanted, "texture_uint8");
+  add_side<float>(sides, place, volume, max_pixels, wanted, "texture_float");
   return sides;
 }
 

@@ -138,7 +138,8 @@ void draw_turn(GridSide &side, const Turn &turn, SideResult &result, HitComparis
   result.ms["new_isovalue"].push_back(isovalue_ms);
   result.ms["new"].push_back(isovalue_ms + kernel_ms);
   std::span<const std::uint8_t> picture;
-  result.ms["picture"].push_back(wall_ms([&] { picture = side.picture(view, shading); }));
+  result.ms["picture"].push_back(
+      wall_ms([&] { picture = side.picture(view, shading, Normals::kCell); }));
   if (!turn.compares) return;
   std::vector<float> depth;
   for (const GridHit &hit : side.hits()) depth.push_back(hit.t);

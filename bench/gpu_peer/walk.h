@@ -4,6 +4,7 @@
 
 #include "bench/gpu_peer/sides.hpp"
 #include "bench/gpu_peer/skips.h"
+#include "bench/gpu_peer/smooth_gradient.h"
 
 namespace isowave::core::bench {
 
@@ -143,9 +144,9 @@ struct RaySide {
   bool known = false, inside = false;
 };
 
-/// The first change in a cell. Returns whether there is one.
-PEER_BOTH bool hit_in_cell(const Walk &walk, const Corners &corners, float t_scale, RaySide &side,
-                           GridHit *hit) {
+/// The first change in a cell: when, and where in the cell. Returns whether there is one.
+PEER_BOTH bool hit_in_cell(const Walk &walk, const Corners &corners, RaySide &side, float *t,
+                           float at[3]) {
   const float end = walk.cell_end();
   const Segment way = walk.way(end);
   const FieldCubic cubic = cubic_along(corners, way);
@@ -153,31 +154,29 @@ PEER_BOTH bool hit_in_cell(const Walk &walk, const Corners &corners, float t_sca
   side.known = true;
   float s;
   if (!first_change(cubic, side.inside, &s)) return false;
-  float at[3], gradient[3];
   for (int a = 0; a < 3; ++a) at[a] = way.from[a] + s * way.step[a];
-  gradient_at(corners, at, gradient);
-  *hit = {(walk.t + s * (end - walk.t)) * t_scale, gradient[0], gradient[1], gradient[2]};
+  *t = walk.t + s * (end - walk.t);
   return true;
 }
 
 /// The first change of `inside := f >= isovalue` along a ray.
 ///
-/// kMasks  whether `skips` has a bit for each cell
-/// Reader  enter(cell): the next cells are in the brick of that one; corners(cell, f): the values
-/// of
-///         its corners, [4 x + 2 y + z]
-template <bool kMasks, class Reader>
+/// kMasks   whether `skips` has a bit for each cell
+/// kSmooth  whether the hit's gradient is smooth, or the one of the cell's field
+/// Reader   enter(cell): the next cells are in the brick of that one; corners(cell, f): the values
+///          of its corners, [4 x + 2 y + z]; value(x, y, z): a voxel's
+template <bool kMasks, bool kSmooth, class Reader>
 PEER_BOTH GridHit first_hit(const Skips &skips, const WalkRay &ray, Reader reader, float isovalue,
                             float t_scale) {
-  GridHit hit{INFINITY, 0.0f, 0.0f, 0.0f};
+  const GridHit none{INFINITY, 0.0f, 0.0f, 0.0f};
   Walk walk;
   RaySide side;
-  if (!walk.enter(ray, skips.dims)) return hit;
+  if (!walk.enter(ray, skips.dims)) return none;
   for (;;) {
     for (;;) {
       const int log = skips.macro_changes(walk.cell) ? kBrickLog : kMacroLog;
       if (log == kBrickLog && skips.brick_changes(walk.cell)) break;
-      if (!walk.leave(log)) return hit;
+      if (!walk.leave(log)) return none;
     }
     const std::uint32_t *mask = nullptr;
     if (kMasks) mask = skips.masks + kMaskWords * skips.slots[skips.brick_of(walk.cell)];
@@ -192,9 +191,13 @@ PEER_BOTH GridHit first_hit(const Skips &skips, const WalkRay &ray, Reader reade
       reader.corners(walk.cell, corners.f);
       for (int i = 0; i < 8; ++i) corners.f[i] -= isovalue;
       if (!kMasks && !changes(corners)) continue;
-      if (hit_in_cell(walk, corners, t_scale, side, &hit)) return hit;
+      float t, at[3], gradient[3];
+      if (!hit_in_cell(walk, corners, side, &t, at)) continue;
+      gradient_at(corners, at, gradient);
+      if (kSmooth) smooth_gradient(reader, skips.dims, walk.cell, corners, isovalue, at, gradient);
+      return {t * t_scale, gradient[0], gradient[1], gradient[2]};
     } while (walk.next_cell());
-    if (!walk.is_in()) return hit;
+    if (!walk.is_in()) return none;
   }
 }
 

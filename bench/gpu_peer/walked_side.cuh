@@ -23,14 +23,15 @@ struct Drawing {
   float isovalue;
 };
 
-template <bool kMasks, class Voxels>
+template <bool kMasks, bool kSmooth, class Voxels>
 PEER_BOTH GridHit hit_of(const Drawing<Voxels> &drawing, const WalkRay &ray) {
-  return first_hit<kMasks>(drawing.skips, ray, typename Voxels::Reader(drawing.voxels),
-                           drawing.isovalue, drawing.view.t_scale);
+  return first_hit<kMasks, kSmooth>(drawing.skips, ray, typename Voxels::Reader(drawing.voxels),
+                                    drawing.isovalue, drawing.view.t_scale);
 }
 
 /// Where the pixel of a kernel goes: hits, or a picture.
 struct StoreHit {
+  static constexpr bool kSmooth = false;
   GridHit *hits;
 
   PEER_BOTH void operator()(const View &, const WalkRay &, std::uint32_t pixel,
@@ -38,7 +39,10 @@ struct StoreHit {
     hits[pixel] = hit;
   }
 };
+/// kSmooth: of smooth gradients, else of the cells' own.
+template <bool kSmoothGradients>
 struct StoreColor {
+  static constexpr bool kSmooth = kSmoothGradients;
   ShadeParams shading;
   std::uint8_t *rgb;
 
@@ -52,7 +56,8 @@ template <bool kMasks, class Voxels, class Store>
 PEER_BOTH void draw_pixel(const Drawing<Voxels> &drawing, const Store &store, std::uint32_t column,
                           std::uint32_t row) {
   const WalkRay ray = ray_of(drawing.view, column, row);
-  store(drawing.view, ray, column + drawing.view.width * row, hit_of<kMasks>(drawing, ray));
+  store(drawing.view, ray, column + drawing.view.width * row,
+        hit_of<kMasks, Store::kSmooth>(drawing, ray));
 }
 
 constexpr std::uint32_t kTile = 8;  ///< pixels along an edge of a group's tile
@@ -140,9 +145,14 @@ class WalkedSide : public GridSide {
     hits_.read(hits.data(), hits.size());
     return hits;
   }
-  std::span<const std::uint8_t> picture(const View &view, const ShadeParams &shading) override {
+  std::span<const std::uint8_t> picture(const View &view, const ShadeParams &shading,
+                                        Normals normals) override {
     const std::size_t bytes = 3 * std::size_t{view.width} * view.height;
-    draw_on<kMasks>(place_, drawing(view), StoreColor{shading, rgb_.data()});
+    if (normals == Normals::kSmooth) {
+      draw_on<kMasks>(place_, drawing(view), StoreColor<true>{shading, rgb_.data()});
+    } else {
+      draw_on<kMasks>(place_, drawing(view), StoreColor<false>{shading, rgb_.data()});
+    }
     rgb_.read(host_rgb_.data(), bytes);
     return {host_rgb_.data(), bytes};
   }
