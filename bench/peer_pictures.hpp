@@ -35,7 +35,7 @@ std::filesystem::path picture_path(const std::string &folder, const std::string 
 ///   warm  the same view again
 struct PeerPictures {
   std::string side;                                 ///< begins the names of its pictures
-  std::string name;                                 ///< for people
+  std::string name{};                               ///< for people
   std::map<std::string, std::vector<double>> ms{};  ///< kind -> every view of every round
   std::uint64_t bytes = 0;  ///< of the device; on a processor, most memory of the process
 };

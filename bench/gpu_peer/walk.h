@@ -194,7 +194,7 @@ PEER_BOTH GridHit first_hit(const Skips &skips, const WalkRay &ray, Reader reade
       float t, at[3], gradient[3];
       if (!hit_in_cell(walk, corners, side, &t, at)) continue;
       gradient_at(corners, at, gradient);
-      if (kSmooth) smooth_gradient(reader, skips.dims, walk.cell, corners, isovalue, at, gradient);
+      if (kSmooth) smooth_gradient(reader, skips.dims, walk.cell, at, gradient);
       return {t * t_scale, gradient[0], gradient[1], gradient[2]};
     } while (walk.next_cell());
     if (!walk.is_in()) return none;
