@@ -79,14 +79,26 @@ for peer in peers:
             # another field, but nearer than a picture without smooth normals.
             most = 0.001 if side.startswith("texture") else compared(true, cell)["flip"]
             assert difference["flip"] < most, (name, difference)
-            assert difference["differing"] > 0, f"{name} is no peer's"
+            assert not side.startswith("mesh") or difference["differing"] > 0, f"{name}: no mesh"
 END
 }
 
+fuel=$top/tests/data/fuel_64x33x32_uint8.raw.gz
+turned=$work/turned.nhdr # the fuel, of other spacing, turned about z
+cat > "$turned" << END
+NRRD0004
+type: uint8
+dimension: 3
+space dimension: 3
+sizes: 64 33 32
+space directions: (0.8,0.6,0) (-0.9,1.2,0) (0,0,2)
+space origin: (5,6,7)
+encoding: gzip
+data file: $fuel
+END
 for program in "${@:2}"; do
   name=$(basename "$program")
-  fuel=$top/tests/data/fuel_64x33x32_uint8.raw.gz
-  check_pictures "$program" "$name" "$fuel" 40
+  check_pictures "$program" "${name}_turned" "$turned" 40
   check_pictures "$program" "${name}_noise" generate:mixing_layer_40x48x36_uint8 128
   refused 'a missing folder' "$work/none is no folder" "$program" "$fuel" --isovalue 40 \
     --pictures "$work/none"

@@ -88,6 +88,7 @@ std::vector<PeerPictures> draw_pictures(std::vector<std::unique_ptr<IsowaveSide>
                                         std::vector<NamedSide> &peers, const VolumeInfo &info,
                                         const Views &views, const PictureWork &work) {
   std::vector<PeerPictures> results;
+  results.reserve(isowave.size() + peers.size());
   for (const auto &side : isowave) results.push_back({.side = side->name()});
   for (const NamedSide &peer : peers) results.push_back({.side = peer.name});
   const std::size_t count = results.size();
