@@ -267,8 +267,12 @@ std::vector<Point> read_peers(const std::string &path, const ParetoSubject &subj
       Point point;
       point.name = peer.at("name");
       point.is_peer = true;
-      if (peer.at("ms").contains("cold")) point.cold_ms = peer["ms"]["cold"];
-      point.next_ms = peer.at("ms").at("next");
+      const nlohmann::json &ms = peer.at("ms");
+      // A volume that stays on the device has no cold frames; "new" is a new isovalue's.
+      for (const char *kind : {"new", "cold"}) {
+        if (ms.contains(kind)) point.cold_ms = ms[kind];
+      }
+      point.next_ms = ms.at("next");
       point.memory_bytes = peer.at("bytes");
       point.errors = errors_of(subject.truth, pictures);
       points.push_back(std::move(point));

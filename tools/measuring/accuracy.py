@@ -244,14 +244,42 @@ def detail(run):
 
 # Ways to draw the largest volume, each of which takes its time to store.
 WAYS_OF_THE_LARGEST = (
-    "default,--samples 2,--samples 4,1/2 size,1/4 size,1/8 size,--voxel-pixels 1,--voxel-pixels 2,"
+    "default,--samples 2,--samples 4,--samples 8,1/2 size,1/4 size,1/8 size,--voxel-pixels 1,--voxel-pixels 2,"
     "--voxel-pixels 4,--voxel-pixels 1 --samples 2,--voxel-pixels 1 --samples 4,--time-budget 2,"
     "--time-budget 5,--time-budget 10,--normals cell,--solver linear,BCMC"
 )
 
 
+def drawn_by_others(run, volume, isovalue, options):
+    """Draws a volume with the peers' programs that are there: names of JSON files for --peers."""
+    largest = "ways" in options  # floats of it would not fit
+    sides = "texture_uint8" if largest else "texture_uint8,nanovdb_float_ranges,nanovdb_fpn_ranges"
+    program, chosen = "bench/gpu_peer", {"peers": sides}
+    arguments = (volume,)
+    if run.options.on_cpu:
+        program, chosen = "bench/peer_bench", {"sides": "mesh_low"}
+        arguments = ("--volume", volume)
+    if not (run.options.programs / program).exists():
+        return {}
+    shown = {name: value for name, value in options.items() if name != "ways"}
+    (run.work / "peers").mkdir(exist_ok=True)
+    run.run(
+        program,
+        *arguments,
+        isovalue=isovalue,
+        **shown,
+        **chosen,
+        pictures="peers",
+        json="peers/p.json",
+    )
+    document = run.read_json("peers/p.json")
+    others = [p for p in document["pareto_peers"] if not p["side"].startswith("isowave")]
+    (run.work / "peers" / "others.json").write_text(json.dumps({"pareto_peers": others}))
+    return {"peers": "peers/others.json"}
+
+
 def pareto(run):
-    """A row for each volume: what `isowave bench pareto` writes of it."""
+    """A row for each volume: what `isowave bench pareto` writes of it, and of peers."""
     subjects = [(path, isovalues[0], {}) for path, isovalues in run.real_volumes("LIDC2")]
     subjects += [(path, isovalues[1], {}) for path, isovalues in run.real_volumes("bonsai")]
     options = {"size": "1280x720", "views": 3, "rounds": 3}
@@ -267,13 +295,15 @@ def pareto(run):
         subjects.append((f"generate:{GPU_VOLUMES[3]}_uint8", 128, ways))
     rows = []
     for volume, isovalue, more in subjects:
+        more = {**options, **more}
         run.run(
             "isowave",
             "bench",
             "pareto",
             volume,
             isovalue=isovalue,
-            **{**options, **more},
+            **more,
+            **drawn_by_others(run, volume, isovalue, more),
             device=run.options.device,
             json="o.json",
         )
