@@ -106,7 +106,8 @@ for bad in "--ways full" "--ways default,,BCMC" "--size 0x3" "--views 0"; do
   [ "$(wc -l <"$work/error")" -eq 1 ] || fail "$bad: $(cat "$work/error")"
 done
 
-"$program" bench topology generate:noisy_scan_64x64x64_uint8 -i 128 --json "$work/parts.json" >"$work/out"
+"$program" bench topology generate:noisy_scan_64x64x64_uint8 -i 128 \
+  --json "$work/parts.json" >"$work/out"
 "$top/tools/charts" "$work/parts.json" -o "$work"
 [ -s "$work/parts_topology.png" ] || fail "parts_topology.png is missing"
 /usr/bin/python3 - "$work/parts.json" <<'EOF'

@@ -24,7 +24,7 @@ measured() { # OPTION...: into the results
 }
 measured --only frames,normals,error,time,stability,sweep,paper,devices,cpus
 measured --only storage,sizes,detail,solvers,pareto,topology --volumes "$top/tests/data"
-tables=(front frames normals error time cpus stability leaks storage sizes detail solvers
+tables=(frames normals error time cpus stability leaks storage sizes detail solvers
   solver_frames pareto pareto_ways topology paper_claims paper_stand_ins paper_passes paper_times
   paper_published_passes paper_published_memory paper_progress paper_utilisation paper_scanned
   paper_limits paper_working_set paper_memory paper_blocks paper_scaling by_device)
@@ -59,7 +59,8 @@ assert coarse < one < four, detail
 EOF
 if grep -qF "$top/tests/data" "$results"; then fail 'the folder of the volumes is named'; fi
 "$top/tools/charts" "$results" -o "$work" > "$work/out"
-for chart in a_{cells,frames,pareto,pareto_new,pareto_wrong,pareto_bytes,stability,topology,budgets,time,memory,speculation}; do
+for chart in a_{cells,frames,pareto,pareto_{new,wrong,bytes},stability,topology,budgets} \
+  a_{time,memory,speculation}; do
   [ -s "$work/$chart.png" ] || fail "$chart.png is missing"
 done
 

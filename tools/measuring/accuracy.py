@@ -244,7 +244,8 @@ def detail(run):
 
 # Ways to draw the largest volume, each of which takes its time to store.
 WAYS_OF_THE_LARGEST = (
-    "default,--samples 2,--samples 4,--samples 8,1/2 size,1/4 size,1/8 size,--voxel-pixels 1,--voxel-pixels 2,"
+    "default,--samples 2,--samples 4,--samples 8,1/2 size,1/4 size,1/8 size,"
+    "--voxel-pixels 1,--voxel-pixels 2,"
     "--voxel-pixels 4,--voxel-pixels 1 --samples 2,--voxel-pixels 1 --samples 4,--time-budget 2,"
     "--time-budget 5,--time-budget 10,--normals cell,--solver linear,BCMC"
 )

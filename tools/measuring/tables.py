@@ -42,19 +42,6 @@ def frames(rows):
         )
 
 
-def front(rows):
-    yield "volume", "device memory", "cold", "next", "warm", "floor"
-    for row in rows:
-        if option(row, "--pipeline") != "rays":
-            continue
-        yield (
-            name_of(row["volume"]),
-            mebibytes(row["memory"]),
-            *thrice(row),
-            ms(row["floor"]) if row["floor"] else "-",
-        )
-
-
 def normals(rows):
     """Each volume has a row for each kind of normals, the cells' own first."""
     yield "volume", "normals", "cold ms", "next", "warm", "blocks decoded", "cold", "next", "warm"
@@ -470,11 +457,11 @@ def topology(rows):
             )
 
 
-# Name of a table -> (section of the JSON, table). `front` is the front page's, of the same frames.
+# Name of a table -> (section of the JSON, table).
 TABLES = {
     table.__name__: (section, table)
     for section, *tables in (
-        ("frames", frames, front),
+        ("frames", frames),
         ("normals", normals),
         ("ambient", ambient),
         ("speculation", speculation),
