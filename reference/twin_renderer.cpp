@@ -64,6 +64,7 @@ Camera TwinRenderer::camera(std::span<const float> isovalues, std::optional<Imag
 }
 
 FrameArrays TwinRenderer::fetch(const WantedArrays &wanted, const Appearance &appearance) {
+  check_arrays(wanted, size_);
   const std::vector<HitRecord> hits = this->hits();
   const ShadeParams shading = make_shade_params(volume_.info, appearance);
   FrameArrays arrays;

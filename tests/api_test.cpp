@@ -196,8 +196,14 @@ TEST_P(ApiOnDevice, FramesKeepErrorsAndTimes) {
   EXPECT_TRUE(bounded.detail->reachable);
   ASSERT_EQ(bounded.bounds.size(), bounded.depth.size());
   EXPECT_FALSE(bounded.statistics.errors_are_stated);
-  request.max_surface_error.reset();
   request.want_bounds = false;
+  request.by = Evidence::kSample;
+  const Frame sampled = renderer.render(request);
+  ASSERT_TRUE(sampled.detail && sampled.detail->sample);
+  EXPECT_GE(sampled.detail->sample->lowest, 0.99);
+  EXPECT_FALSE(bounded.detail->sample);
+  request.by = Evidence::kProof;
+  request.max_surface_error.reset();
   const std::vector<float> depth = renderer.render(request).depth;
   request.time_budget_ms = 1e6;
   const Frame timed = renderer.render(request);

@@ -303,6 +303,7 @@ TEST_P(BrickTeamOnDevice, PicturesWithinATime) {
 struct BoundedCase {
   FrameRequest request;
   double max_surface_error;
+  Evidence by = Evidence::kProof;
 };
 struct BoundedFrame {
   DetailChoice choice;
@@ -316,6 +317,7 @@ BoundedFrame draw_within(Renderer &renderer, const CompressedVolume &volume, dou
   BoundedRenderer bounded(renderer, volume, rate);
   FrameRequest request = of.request;
   request.max_surface_error = of.max_surface_error;
+  request.by = of.by;
   BoundedFrame frame;
   frame.choice = bounded.render(request).detail.value();
   frame.depth = bounded.depth();
@@ -330,9 +332,13 @@ std::string text_of(const DetailChoice &choice) {
       fmt::format("{} {}: reachable {}, median {}, tolerance {}, {}", choice.detail.voxel_pixels,
                   choice.detail.voxel_error, choice.reachable, choice.median,
                   choice.tolerance.value_or(0), choice.advice);
+  if (choice.sample) {
+    text += fmt::format(", {} of {} of {}, {}", choice.sample->num_within, choice.sample->num_hits,
+                        choice.sample->num_rays, choice.sample->lowest);
+  }
   for (const DetailChoice::Try &each : choice.tries)
-    text += fmt::format("; {} {}: {}", each.detail.voxel_pixels, each.detail.voxel_error,
-                        each.certified);
+    text +=
+        fmt::format("; {} {}: {}", each.detail.voxel_pixels, each.detail.voxel_error, each.kept);
   return text;
 }
 
@@ -381,9 +387,11 @@ TEST_P(BrickTeamOnDevice, WithinAnError) {
   far.eye += 0.6 * (far.eye - far.at);
   const Camera inside = test::camera_along(0.45 * glm::dvec3(info.dims), {1, 0.25, -0.5}),
                at_face = test::camera_along({49.5, 37.5, -5}, {0, 0, 1});
-  const std::vector<BoundedCase> cases = {{{.camera = far, .isovalue = 0.5f}, 3},
-                                          {{.camera = inside, .isovalue = 0.5f}, 2},
-                                          {{.camera = at_face, .isovalue = 0.35f}, 1e-6}};
+  const std::vector<BoundedCase> cases = {
+      {{.camera = far, .isovalue = 0.5f}, 3},
+      {{.camera = inside, .isovalue = 0.5f}, 2},
+      {{.camera = at_face, .isovalue = 0.35f}, 1e-6},
+      {{.camera = far, .isovalue = 0.5f}, 3, Evidence::kSample}};
   double most_pixels = 0, most_error = 0;
   std::uint64_t num_uncertain = 0;
   for (const bool is_bounded : {false, true}) {

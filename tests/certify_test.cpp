@@ -278,7 +278,7 @@ TEST_P(CertifyOnDevice, ChoosesLessForMore) {
       const CertificateSummary summary =
           summarize(certify(renderer, scene.volume, request, drawn), max_surface_error);
       EXPECT_GE(double(summary.num_certified) / double(summary.num_pixels),
-                choice.tries[0].certified - kLostShare)
+                choice.tries[0].kept - kLostShare)
           << "a picture so small is tried as it is";
     }
   }
@@ -308,7 +308,7 @@ TEST_P(CertifyOnDevice, TakesNoLevelsThatSpareLittle) {
   const DetailChoice choice = choose_detail(renderer, scene.volume, {camera, 0.3f}, 0.05);
   EXPECT_TRUE(std::ranges::any_of(choice.tries, [&](const DetailChoice::Try &each) {
     return each.detail.voxel_pixels > 0.6 &&
-           each.certified >= choice.tries[0].certified - kLostShare;
+           each.kept >= choice.tries[0].kept - kLostShare;
   })) << "the error would allow them";
   EXPECT_EQ(choice.detail.voxel_pixels, 0);
   EXPECT_EQ(renderer.render(with_detail({camera, 0.3f}, choice.detail)).last_level, 0u);

@@ -52,6 +52,7 @@ TEST(CliOptions, EmptyValuesAreRefused) {
                              "--stats",
                              "--device",
                              "--max-surface-error",
+                             "--by",
                              "--progress-dir",
                              "--color",
                              "--dims",

@@ -192,6 +192,8 @@ TEST_F(CliRanks, AmbientRays) {
 TEST_F(CliRanks, WithinAnError) {
   expect_same_within(convert("--exact --levels all"),
                      "-i 40 -i 90 --size 48x32 --samples 2 --ambient 2 --max-surface-error 2", 3);
+  expect_same(convert("--exact --levels all"),
+              "-i 40 --size 200x150 --max-surface-error 2 --by sample", 3);
   expect_same_within(kFuel, "--rate 20 --levels 1 -i 40 --size 48x32 --max-surface-error 2", 2,
                      " --bricks active --progress-dir " + quoted(folder_ / "p"));
   EXPECT_TRUE(std::filesystem::exists(folder_ / "p" / "pass0001.png"));

@@ -386,6 +386,29 @@ TEST(CliRender, MaxError) {
                               "--error-map needs --max-surface-error");
 }
 
+TEST(CliRender, MaxErrorBySample) {
+  const TemporaryFolder folder;
+  const std::string volume = "generate:mixing_layer_48x48x48_uint8 -i 128 --size 200x150 ",
+                    error = "--max-surface-error 4 --by sample ";
+  const auto run = render(volume + "--orbit 1 --rate 8 --no-stage-times " + error + "--stats " +
+                          quoted(folder / "a.json"));
+  EXPECT_NE(run.out.find("% confidence (Clopper-Pearson)"), std::string::npos) << run.out;
+  const json said = json::parse(test::read_file(folder / "a.json"))["frames"][0]["error"];
+  EXPECT_EQ(said["by"], "sample");
+  EXPECT_GE(said["lowest_share"], 0.99);
+  EXPECT_EQ(said["confidence"], 0.95);
+  EXPECT_GE(said["sampled_hits"], said["within"]);
+  EXPECT_GT(said["sampled_rays"], said["sampled_hits"]);
+  EXPECT_GT(said["tries"].size(), 3u);
+  EXPECT_EQ(said["tries"][0]["within"], 1.0);
+
+  const std::string command = "render " + volume + " -o " + quoted(folder / "b.png ");
+  test::expect_one_line_error(command + "--max-surface-error 1 --by nonsense", "--by");
+  test::expect_one_line_error(command + "--by sample", "--by sample needs --max-surface-error");
+  test::expect_one_line_error(command + error + "--error-map " + quoted(folder / "e.npy"),
+                              "leave out --by sample");
+}
+
 TEST(CliRender, TimeBudget) {
   const TemporaryFolder folder;
   const std::string scene = kHead + " -i 80 --size 64x48 ";

@@ -6,7 +6,8 @@
 
 namespace isowave::core {
 
-/// Draws frames with a largest surface error (choose_detail()). Other requests are handed on.
+/// Draws frames with a largest surface error (choose_detail()): by proof if the other renderer has
+/// bounds, by sample in any case. Other requests are handed on.
 class BoundedRenderer : public RendererAround {
  public:
   /// volume  that this process's renderer was made for; must outlive this
@@ -19,6 +20,7 @@ class BoundedRenderer : public RendererAround {
   Abilities abilities() const override {
     Abilities abilities = inner().abilities();
     abilities.surface_error = abilities.bounds;
+    abilities.sampled_error = true;
     return abilities;
   }
 
@@ -28,8 +30,9 @@ class BoundedRenderer : public RendererAround {
     check(request, abilities());
     FrameRequest chosen = request;
     chosen.max_surface_error.reset();
+    chosen.by = Evidence::kProof;
     DetailChoice choice =
-        choose_detail(inner(), volume_, rate_, chosen, *request.max_surface_error);
+        choose_detail(inner(), volume_, rate_, chosen, *request.max_surface_error, request.by);
     FrameStats stats = inner().render(with_detail(std::move(chosen), choice.detail));
     stats.detail = std::move(choice);
     return stats;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/accuracy/ray_sample.hpp"
 #include "core/base/error.hpp"
 #include "core/base/ms_since.hpp"
 #include "core/view/detail.hpp"
@@ -13,8 +14,6 @@ namespace isowave::core {
 
 namespace {
 
-/// Stride of the small picture's pixels in the frame, along each axis, and its fewest rows.
-constexpr std::uint32_t kMaxStride = 8, kMinRows = 64;
 /// Distances between voxels that may be chosen: 8 pixels, and so many times an eighth of an octave
 /// less.
 constexpr int kNumVoxelPixels = 41;
@@ -98,74 +97,146 @@ void advise(const CompressedVolume &volume, double error, double max_surface_err
   }
 }
 
+/// Draws a sample of a frame's rays with one detail after another, and judges each.
+class Judge {
+ public:
+  /// Draws the sample at full detail.
+  Judge(Renderer &renderer, const CompressedVolume &volume, const FrameRequest &request,
+        double max_surface_error, Evidence by)
+      : renderer_(renderer),
+        volume_(volume),
+        request_(request),
+        size_(sample_of(size_of(request, renderer.abilities()))),
+        max_surface_error_(max_surface_error),
+        by_(by) {
+    request_.normals = Normals::kCell;
+    request_.ambient_rays = 0;
+    request_.size = size_;
+    request_.on_pass = {};
+    const View view = make_view(renderer.levels().front(), request.camera, size_);
+    for (std::uint32_t ray = 0; ray < size_.num_rays(); ++ray) {
+      if (!is_in_picture(view, size_, ray)) beside_.push_back(ray);
+    }
+    best_ = kept_with({});
+  }
+
+  /// Whether enough pixels keep the error with a detail.
+  bool keeps(const Detail &detail) {
+    const double kept = kept_with(detail);
+    return by_ == Evidence::kSample ? suffices(samples_.back()) : kept >= best_ - kLostShare;
+  }
+
+  double best() const { return best_; }  ///< share of the pixels, at full detail
+  double median() const { return median_; }
+  const std::vector<float> &finest_depth() const { return finest_depth_; }
+  const std::vector<DetailChoice::Try> &tries() const { return tries_; }
+  /// A sample with a detail that was tried.
+  SampledShare sample_with(const Detail &detail) const {
+    const auto found = std::ranges::find(tries_, detail, &DetailChoice::Try::detail);
+    SampledShare sample = samples_[std::size_t(found - tries_.begin())];
+    sample.lowest = detail == Detail{} ? 1 : lowest_share(sample.num_within, sample.num_hits);
+    return sample;
+  }
+
+ private:
+  double kept_with(const Detail &detail) {
+    const FrameRequest request = with_detail(request_, detail);
+    renderer_.render(request);
+    std::vector<float> depth = renderer_.depth();
+    tries_.push_back({detail, by_ == Evidence::kSample ? sampled(std::move(depth))
+                                                       : certified(request, std::move(depth))});
+    return tries_.back().kept;
+  }
+
+  double sampled(std::vector<float> depth) {
+    leave_out_beside(depth, INFINITY);
+    if (samples_.empty()) finest_depth_ = depth;
+    const SampledShare own =
+        compare_hits(request_.camera, size_, finest_depth_, depth, max_surface_error_);
+    samples_.push_back(of_first(renderer_.team(), std::vector{own}).front());
+    return samples_.back().share();
+  }
+
+  double certified(const FrameRequest &request, std::vector<float> depth) {
+    std::vector<float> bounds = certify(renderer_, volume_, request, depth).bounds;
+    leave_out_beside(bounds, 0);
+    leave_out_beside(depth, INFINITY);
+    const CertificateSummary summary =
+        of_first(renderer_.team(), std::vector{summarize(bounds, max_surface_error_)}).front();
+    if (tries_.empty()) {
+      finest_depth_ = std::move(depth);
+      median_ = summary.median;
+    }
+    return summary.num_pixels == 0 ? 1.0
+                                   : double(summary.num_certified) / double(summary.num_pixels);
+  }
+
+  /// values: of the sample's rays, or none
+  void leave_out_beside(std::vector<float> &values, float nothing) const {
+    if (values.empty()) return;
+    for (const std::uint32_t ray : beside_) values[ray] = nothing;
+  }
+
+  Renderer &renderer_;
+  const CompressedVolume &volume_;
+  FrameRequest request_;
+  ImageSize size_;
+  double max_surface_error_;
+  Evidence by_;
+  std::vector<std::uint32_t> beside_;  ///< rays of the sample beside the picture
+  std::vector<float> finest_depth_;
+  std::vector<DetailChoice::Try> tries_;
+  std::vector<SampledShare> samples_;  ///< by sample: of each try
+  double best_ = 0, median_ = 0;
+};
+
 }  // namespace
 
 DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, double rate,
-                           const FrameRequest &request, double max_surface_error) {
+                           const FrameRequest &request, double max_surface_error, Evidence by) {
   check_max_surface_error(max_surface_error);
   const auto begin = std::chrono::steady_clock::now();
   Team &team = renderer.team();
   const Abilities abilities = renderer.abilities();
   check(request, abilities);
-  const ImageSize size = size_of(request, abilities);
   const std::vector<VolumeInfo> levels = renderer.levels();
-  const std::uint32_t pixels = std::clamp(size.height / kMinRows, 1u, kMaxStride);
-  const ImageSize small{std::max(size.width / pixels, 1u), size.height / pixels};
-  const double stride = double(size.height) / small.height;
-  // Neither is known: certify() throws.
+  const bool by_sample = by == Evidence::kSample;
+  // By proof, certify() throws if neither is known.
   const double error = known_voxel_error(volume).value_or(double{largest_bound(volume.bounds)});
+  Judge judge(renderer, volume, request, max_surface_error, by);
   DetailChoice choice;
-  const auto try_out = [&](const Detail &detail) {
-    FrameRequest sample = with_detail(request, {detail.voxel_pixels / stride, detail.voxel_error});
-    sample.normals = Normals::kCell;
-    sample.ambient_rays = 0;
-    sample.size = small;
-    sample.on_pass = {};
-    renderer.render(sample);
-    std::vector<float> depth = renderer.depth();
-    const CertificateSummary summary =
-        of_first(team, std::vector{summarize(certify(renderer, volume, sample, depth),
-                                             max_surface_error / stride)})
-            .front();
-    const double all = std::max<double>(double(summary.num_pixels), 1);
-    choice.tries.push_back(
-        {detail, summary.num_pixels == 0 ? 1.0 : double(summary.num_certified) / all});
-    return std::pair(summary, std::move(depth));
-  };
-  const auto [at_full_detail, finest_depth] = try_out({});
-  choice.median = stride * at_full_detail.median;
-  const double best = choice.tries.front().certified;
-  choice.reachable = best >= 0.5;
+  choice.median = judge.median();
+  choice.reachable = judge.best() >= 0.5;
   if (!choice.reachable) advise(volume, error, max_surface_error, choice);
-  const auto suffices = [&](const Detail &detail) {
-    try_out(detail);
-    return choice.tries.back().certified >= best - kLostShare;
-  };
   // The first of descending numbers that suffices, or 0. Nearly always, what suffices does so with
   // any less, too: a bisection.
   const auto first_to_suffice = [&](const std::vector<double> &all, const auto &detail_of) {
     const std::vector<double> numbers = of_first(team, all);
     const auto found = std::ranges::partition_point(
-        numbers, [&](double number) { return !suffices(detail_of(number)); });
+        numbers, [&](double number) { return !judge.keeps(detail_of(number)); });
     return found == numbers.end() ? 0.0 : *found;
   };
   // Beside voxels without data, coarser levels have no bound.
-  if (choice.reachable && levels.size() > 1 && volume.no_data.empty()) {
+  if (choice.reachable && abilities.levels && levels.size() > 1 &&
+      (by_sample || volume.no_data.empty())) {
     const double coarsest = first_to_suffice(all_voxel_pixels(), [](double voxel_pixels) {
       return Detail{voxel_pixels, 0};
     });
-    const std::vector<FrameParams> level_frames =
-        make_level_frames(levels, request.camera, size, request.isovalue, coarsest);
+    const std::vector<FrameParams> level_frames = make_level_frames(
+        levels, request.camera, size_of(request, abilities), request.isovalue, coarsest);
     const double share =
-        of_first(team, std::vector{blocks_share(finest_depth, level_frames)}).front();
+        of_first(team, std::vector{blocks_share(judge.finest_depth(), level_frames)}).front();
     if (share <= kMaxBlocksShare) choice.detail.voxel_pixels = coarsest;
   }
-  if (choice.reachable && rate > kMinPlaneRate && !volume.precision.is_reversible()) {
+  if (choice.reachable && abilities.fewer_planes && rate > kMinPlaneRate &&
+      !volume.precision.is_reversible()) {
     choice.detail.voxel_error =
         first_to_suffice(voxel_errors(volume, error), [&](double voxel_error) {
           return Detail{choice.detail.voxel_pixels, voxel_error};
         });
   }
+  choice.tries = judge.tries();
+  if (by_sample) choice.sample = judge.sample_with(choice.detail);
   choice.total_ms = ms_since(begin);
   return choice;
 }

@@ -21,25 +21,32 @@ inline constexpr double kMinPlaneRate = 16;
 
 /// Chooses the detail of one frame.
 ///
-/// renderer           with bounds and all levels of detail of the volume, or a team of such
-///                    renderers; its last frame is then another one
+/// renderer           with all levels of detail of the volume, by proof with bounds, or a team of
+///                    such renderers; its last frame is then another one
 /// volume             the volume that this process's renderer was made for
 /// rate               rate of the whole volume [bits per voxel]
 /// request            the frame's request; its voxel_pixels and voxel_error do not matter
 /// max_surface_error  error that most pixels are to keep [pixels], above 0
 ///
-/// Draws small pictures of the frame, with a part of its pixels, and their bounds (certify()). So
-/// the choice depends on data, camera and size, never on timings. Picks the coarsest levels of
-/// detail, then the fewest bit planes, that cost at most kLostShare of the certified pixels. Levels
-/// are skipped if they save too few blocks (kMaxBlocksShare); bit planes are kept for volumes below
-/// kMinPlaneRate bits a voxel. Full detail if most pixels do not keep max_surface_error even so.
-/// All ranks of a team choose what rank 0 finds. Throws Error as certify() does.
+/// Draws a sample of the frame's rays (ray_sample.hpp). So the choice depends on data, camera and
+/// size, never on timings. Picks the coarsest levels of detail, then the fewest bit planes:
+///
+/// by proof   that cost at most kLostShare of the certified pixels (certify()); full detail if most
+///            pixels do not keep max_surface_error even so
+/// by sample  with which the hits keep max_surface_error against full detail (suffices()); needs no
+///            bounds, and takes any solver
+///
+/// Levels are skipped if they save too few blocks (kMaxBlocksShare); bit planes are kept for
+/// volumes below kMinPlaneRate bits a voxel. All ranks of a team choose what rank 0 finds. Throws
+/// Error as certify() does, by proof.
 DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, double rate,
-                           const FrameRequest &request, double max_surface_error);
+                           const FrameRequest &request, double max_surface_error,
+                           Evidence by = Evidence::kProof);
 /// The same with a renderer of the whole volume.
 inline DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume,
-                                  const FrameRequest &request, double max_surface_error) {
-  return choose_detail(renderer, volume, volume.rate(), request, max_surface_error);
+                                  const FrameRequest &request, double max_surface_error,
+                                  Evidence by = Evidence::kProof) {
+  return choose_detail(renderer, volume, volume.rate(), request, max_surface_error, by);
 }
 
 }  // namespace isowave::core

@@ -11,18 +11,18 @@ namespace isowave {
 
 /// The renderers that add_choices() puts around another.
 struct Choices {
-  bool with_bounds = false;       ///< frames within an error: the other one has bounds
   bool with_time_budget = false;  ///< frames within a time: the other one keeps pictures
 };
 
+/// Adds frames within an error: by sample, and by proof if the other renderer has bounds.
+///
 /// volume  that this process's renderer was made for; must outlive the result
 /// rate    of the whole volume [bits per voxel]
 inline std::unique_ptr<core::Renderer> add_choices(std::unique_ptr<core::Renderer> renderer,
                                                    const Choices &choices,
                                                    const core::CompressedVolume &volume,
                                                    double rate) {
-  if (choices.with_bounds)
-    renderer = std::make_unique<core::BoundedRenderer>(std::move(renderer), volume, rate);
+  renderer = std::make_unique<core::BoundedRenderer>(std::move(renderer), volume, rate);
   if (choices.with_time_budget)
     renderer = std::make_unique<core::TimedRenderer>(std::move(renderer));
   return renderer;

@@ -24,13 +24,14 @@ core::RendererOptions core_options(const RendererOptions &options, std::uint32_t
 }
 
 Choices choices_of(const RendererOptions &options) {
-  return {options.with_bounds, options.with_time_budget};
+  return {.with_time_budget = options.with_time_budget};
 }
 
 core::Abilities abilities_on_device(const RendererOptions &options, const Volume &volume) {
   core::Abilities abilities =
       core::DeviceRenderer::abilities_of(core_options(options, volume.num_levels()));
   abilities.surface_error = options.with_bounds;
+  abilities.sampled_error = true;
   abilities.time_budget = options.with_time_budget;
   return abilities;
 }

@@ -77,6 +77,7 @@ core::FrameRequest core_request(const FrameRequest &request, const core::Compres
       shows_normals ? static_cast<core::Normals>(request.normals) : core::Normals::kCell;
   if (request.want_picture || request.on_pass) result.ambient_rays = request.ambient_rays;
   result.max_surface_error = request.max_surface_error;
+  result.by = static_cast<core::Evidence>(request.by);
   result.time_budget_ms = request.time_budget_ms;
   return result;
 }
@@ -178,7 +179,13 @@ Array<std::uint8_t> ProgressInTurns::picture() const {
 }
 
 DetailChoice public_choice(const core::DetailChoice &choice) {
-  return {choice.detail.voxel_pixels, choice.detail.voxel_error, choice.reachable, choice.advice};
+  DetailChoice result{choice.detail.voxel_pixels, choice.detail.voxel_error, choice.reachable,
+                      choice.advice};
+  if (choice.sample) {
+    result.sample = {choice.sample->num_rays, choice.sample->num_hits, choice.sample->num_within,
+                     choice.sample->lowest};
+  }
+  return result;
 }
 
 void describe_frame(const FrameRequest &request, const core::FrameStats &stats, Frame &frame) {

@@ -17,12 +17,12 @@ std::unique_ptr<core::Renderer> make_on_host(const core::CompressedVolume &volum
                          volume, core::HostRendererOptions{.memory_limit = options.memory_limit,
                                                            .num_threads = options.num_threads,
                                                            .largest = core_size(options.largest)}),
-                     {.with_bounds = true, .with_time_budget = true}, volume, volume.rate());
+                     {.with_time_budget = true}, volume, volume.rate());
 }
 
 core::Abilities abilities_on_host(const core::CompressedVolume &volume) {
   core::Abilities abilities = core::HostRenderer::abilities_of(volume);
-  abilities.surface_error = abilities.time_budget = true;
+  abilities.surface_error = abilities.sampled_error = abilities.time_budget = true;
   return abilities;
 }
 

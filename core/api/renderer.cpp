@@ -90,6 +90,7 @@ Frame Renderer::Implementation::draw(const FrameRequest &request) {
   if (stats.detail) {
     wanted = core::with_detail(wanted, stats.detail->detail);
     wanted.max_surface_error.reset();
+    wanted.by = core::Evidence::kProof;
     if (team.rank() == 0) frame.detail = public_choice(*stats.detail);
   }
   fetch(request, frame);

@@ -249,6 +249,7 @@ std::vector<HitRecord> TeamRenderer::compose_hits(std::span<const HitRecord> own
 }
 
 FrameArrays TeamRenderer::fetch(const WantedArrays &wanted, const Appearance &appearance) {
+  check_arrays(wanted, size());
   const bool receives = team_.rank() == 0;
   FrameArrays arrays;
   if (wanted.picture) arrays.picture = compose_picture(appearance);

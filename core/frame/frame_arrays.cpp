@@ -1,10 +1,17 @@
 #include "core/frame/frame_arrays.hpp"
 
+#include <stdexcept>
+
 #include "core/view/detail.hpp"
 #include "core/volume/pyramid.hpp"
 #include "core/volume/world_positions.hpp"
 
 namespace isowave::core {
+
+void check_arrays(const WantedArrays &wanted, ImageSize size) {
+  if (wanted.picture && size.stride != 1)
+    throw std::logic_error("a sample of a frame's rays has no picture");
+}
 
 HitMap make_hit_map(std::span<const VolumeInfo> levels) {
   static_assert(ISO_MAX_LEVELS == kMaxLevels);

@@ -28,6 +28,9 @@ struct FrameArrays {
   HostArray<std::array<double, 3>> positions;  ///< see hit_position()
 };
 
+/// Throws  std::logic_error: the picture of a sample of rays (ImageSize::stride) is wanted
+void check_arrays(const WantedArrays &wanted, ImageSize size);
+
 /// levels  of detail that may have hits, the finest first
 HitMap make_hit_map(std::span<const VolumeInfo> levels);
 

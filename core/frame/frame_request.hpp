@@ -19,6 +19,12 @@ namespace isowave::core {
 /// after each pass; otherwise the host stays a pass ahead.
 using OnPass = std::function<bool(const PassStats &)>;
 
+/// The evidence for a largest surface error (core/accuracy/choose_detail.hpp).
+enum class Evidence {
+  kProof,  ///< bounds of most pixels, against the volume before compression
+  kSample  ///< a sample of the frame's rays, against full detail
+};
+
 /// One frame: what to draw, and how precisely. The same request gives the same picture, bit for
 /// bit.
 struct FrameRequest {
@@ -40,9 +46,11 @@ struct FrameRequest {
   /// Rays from each hit that find out how much of the sky it sees, for shading
   /// (kernels_cl/portable/ambient.h); 0: each hit sees all of it.
   std::uint32_t ambient_rays = 0;
-  /// Largest distance to the surface of the volume before compression [pixels]. voxel_pixels and
-  /// voxel_error are then chosen so that most pixels keep it.
+  /// Largest distance to the true surface [pixels]. voxel_pixels and voxel_error are then chosen so
+  /// that most pixels keep it. The true surface is that of the volume before compression, or by
+  /// sample that of full detail.
   std::optional<double> max_surface_error{};
+  Evidence by = Evidence::kProof;  ///< for max_surface_error; kProof without one
   /// Time in which the largest picture possible is drawn, small pictures first.
   std::optional<double> time_budget_ms{};
   OnPass on_pass{};

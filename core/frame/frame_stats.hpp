@@ -61,22 +61,36 @@ struct TimedStep {
 struct Detail {
   double voxel_pixels = 0;  ///< FrameRequest::voxel_pixels
   double voxel_error = 0;   ///< FrameRequest::voxel_error
+
+  friend bool operator==(const Detail &, const Detail &) = default;
+};
+
+/// How much of a sample of a frame's rays keeps an error (Evidence::kSample).
+struct SampledShare {
+  std::uint64_t num_rays = 0;    ///< rays that were drawn
+  std::uint64_t num_hits = 0;    ///< those that hit with full detail, or with the other one
+  std::uint64_t num_within = 0;  ///< those whose two hits are within the error
+  /// Lower end of the confidence interval of num_within / num_hits: see lowest_share().
+  double lowest = 0;
+
+  double share() const { return num_hits == 0 ? 1.0 : double(num_within) / double(num_hits); }
 };
 
 /// The detail that was chosen to keep FrameRequest::max_surface_error.
 struct DetailChoice {
   Detail detail;
-  bool reachable = true;  ///< most pixels keep the error at full detail
-  double median = 0;      ///< median bound at full detail [pixels]
+  bool reachable = true;  ///< most pixels keep the error at full detail; true by sample
+  double median = 0;      ///< median bound at full detail [pixels]; 0 by sample
   /// If it is not reachable: a smaller error of the volume's voxels with which the median would be
   /// max_surface_error; none if no such error is known that a volume can be stored with.
   std::optional<double> tolerance{};
-  std::string advice{};  ///< what would help
-  /// A detail that was tried, and the share of pixels that are not certain to miss and keep the
-  /// error with it.
+  std::string advice{};                  ///< what would help
+  std::optional<SampledShare> sample{};  ///< by sample: with the chosen detail
+  /// A detail that was tried, and the share of pixels that keep the error with it: of those that
+  /// are not certain to miss, or of a sample's hits.
   struct Try {
     Detail detail;
-    double certified = 0;
+    double kept = 0;
   };
   std::vector<Try> tries;
   double total_ms = 0;

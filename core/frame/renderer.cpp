@@ -13,7 +13,11 @@ namespace {
 
 /// Checks settings that either the renderer or the user may choose, not both.
 void check_choices(const FrameRequest &request) {
-  if (!request.max_surface_error) return;
+  if (!request.max_surface_error) {
+    if (request.by == Evidence::kSample)
+      throw Error("a sample is evidence for max_surface_error: give max_surface_error");
+    return;
+  }
   if (request.time_budget_ms)
     throw Error("a frame cannot keep both an error and a time: give one of the two");
   if (request.voxel_pixels != 0 || request.voxel_error != 0)
@@ -63,9 +67,12 @@ void check(const FrameRequest &request, const Abilities &abilities) {
        "device by a renderer that was made with_bounds");
   need(request.ambient_rays != 0, abilities.given_rays,
        "ambient rays need a renderer that was made with_rays");
-  need(request.max_surface_error.has_value(), abilities.surface_error,
-       "this renderer knows no bounds of the error: leave out max_surface_error, or draw on the "
-       "host, or on a device by a renderer that was made with_bounds");
+  const bool by_sample = request.by == Evidence::kSample;
+  need(request.max_surface_error && !by_sample, abilities.surface_error,
+       "this renderer knows no bounds of the error: leave out max_surface_error, judge it by "
+       "sample, or draw on the host, or on a device by a renderer that was made with_bounds");
+  need(by_sample, abilities.sampled_error,
+       "this renderer chooses no detail: leave out max_surface_error");
   need(request.time_budget_ms.has_value(), abilities.time_budget,
        "this renderer keeps no time: leave out time_budget_ms, or draw on the host, or on a device "
        "by a renderer that was made with_time_budget");

@@ -28,7 +28,8 @@ struct Abilities {
   bool bounds = false;             ///< FrameRequest::bound
   bool given_rays = false;         ///< FrameRequest::ambient_rays, and cast_rays()
   bool cells = true;               ///< hits name their cell: HitRecord::block_id
-  bool surface_error = false;      ///< FrameRequest::max_surface_error
+  bool surface_error = false;      ///< FrameRequest::max_surface_error, by proof
+  bool sampled_error = false;      ///< FrameRequest::max_surface_error, by sample
   bool time_budget = false;        ///< FrameRequest::time_budget_ms
   bool kept_picture = false;       ///< keep_picture(), fill_from_kept(), enlarge_kept()
   bool parallel = true;            ///< Camera::parallel_height

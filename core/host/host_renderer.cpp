@@ -280,6 +280,7 @@ std::vector<HitRecord> HostRenderer::hits() {
 
 FrameArrays HostRenderer::fetch(const WantedArrays &wanted, const Appearance &appearance) {
   check_has_picture();
+  check_arrays(wanted, size_);
   const ShadeParams params = make_shade_params(info_, appearance);
   FrameArrays arrays;
   if (wanted.picture) {

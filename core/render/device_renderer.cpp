@@ -360,6 +360,7 @@ void DeviceRenderer::set_hits(std::span<const HitRecord> hits) {
 
 FrameArrays DeviceRenderer::fetch(const WantedArrays &wanted, const Appearance &appearance) {
   check_has_picture();
+  check_arrays(wanted, size_);
   return shade_(wanted, make_shade_params(blocks_.levels[0].info, appearance), hit_map_, rays_,
                 size_.samples);
 }

@@ -72,6 +72,11 @@ void check_image_size(ImageSize size) {
     throw Error("{} x {} rays a pixel cannot be drawn: 1 to {} along each axis can", size.samples,
                 size.samples, ImageSize::kMaxSamples);
   }
+  if (size.stride % 2 == 0 || size.stride > ImageSize::kMaxStride) {
+    throw Error(
+        "a sample of one in {} rays along each axis cannot be drawn: odd numbers up to {} can",
+        size.stride, ImageSize::kMaxStride);
+  }
   const std::uint64_t most = kMaxRays / (size.samples * size.samples);
   if (size.num_pixels() == 0 || size.num_pixels() > most) {
     throw Error("an image of {} x {} pixels cannot be drawn: 1 to {} pixels can", size.width,
@@ -109,12 +114,17 @@ void check_distances(const VolumeInfo &info, std::string_view what) {
 
 namespace {
 
+/// Rows of the picture's rays, whether all of them are drawn or a sample.
+double rows_of(ImageSize size) {
+  return double(size.height) * size.samples;
+}
+
 /// Parallel rays start in a plane around the eye, where float32 must hold their places.
 void check_parallel(double height, ImageSize size, double t_scale, const glm::dvec3 &right,
                     const glm::dvec3 &up) {
   const double v = height / 2 / t_scale, u = v * size.width / size.height;
   const double farthest = u * largest_component(right) + v * largest_component(up);
-  const double step = height / size.ray_rows() / t_scale;
+  const double step = height / rows_of(size) / t_scale;
   if (farthest > 1e7 || step < 0x1p-100) {
     throw Error(
         "a picture of parallel projection that is {:.3g} high cannot be drawn in float32: up to "
@@ -157,27 +167,34 @@ View make_view(const VolumeInfo &info, const Camera &camera, ImageSize size) {
   up *= t_scale;
   if (camera.parallel_height) check_parallel(*camera.parallel_height, size, t_scale, right, up);
 
-  return {
-      .width = size.ray_columns(),
-      .height = size.ray_rows(),
-      .eye_x = flush_tiny(eye.x),
-      .eye_y = flush_tiny(eye.y),
-      .eye_z = flush_tiny(eye.z),
-      .fwd_x = flush_tiny(fwd.x),
-      .fwd_y = flush_tiny(fwd.y),
-      .fwd_z = flush_tiny(fwd.z),
-      .right_x = flush_tiny(right.x),
-      .right_y = flush_tiny(right.y),
-      .right_z = flush_tiny(right.z),
-      .up_x = flush_tiny(up.x),
-      .up_y = flush_tiny(up.y),
-      .up_z = flush_tiny(up.z),
-      .pixel_scale =
-          camera.parallel_height
-              ? static_cast<float>(*camera.parallel_height / 2 / size.ray_rows() / t_scale)
-              : static_cast<float>(std::tan(glm::radians(camera.fovy_deg) / 2) / size.ray_rows()),
-      .t_scale = static_cast<float>(t_scale),
-      .is_parallel = camera.parallel_height ? 1u : 0u};
+  return {.width = size.ray_columns(),
+          .height = size.ray_rows(),
+          .eye_x = flush_tiny(eye.x),
+          .eye_y = flush_tiny(eye.y),
+          .eye_z = flush_tiny(eye.z),
+          .fwd_x = flush_tiny(fwd.x),
+          .fwd_y = flush_tiny(fwd.y),
+          .fwd_z = flush_tiny(fwd.z),
+          .right_x = flush_tiny(right.x),
+          .right_y = flush_tiny(right.y),
+          .right_z = flush_tiny(right.z),
+          .up_x = flush_tiny(up.x),
+          .up_y = flush_tiny(up.y),
+          .up_z = flush_tiny(up.z),
+          .pixel_scale =
+              camera.parallel_height
+                  ? static_cast<float>(*camera.parallel_height / 2 / rows_of(size) / t_scale)
+                  : static_cast<float>(std::tan(glm::radians(camera.fovy_deg) / 2) / rows_of(size)),
+          .t_scale = static_cast<float>(t_scale),
+          .is_parallel = camera.parallel_height ? 1u : 0u,
+          .stride = size.stride};
+}
+
+bool is_in_picture(const View &view, ImageSize size, std::uint32_t ray) {
+  const RayPlace place =
+      place_of_ray(&view, static_cast<int>(ray % view.width), static_cast<int>(ray / view.width));
+  return std::abs(twice_u(&view, place.column)) < static_cast<int>(size.width * size.samples) &&
+         std::abs(twice_v(&view, place.row)) < static_cast<int>(size.height * size.samples);
 }
 
 FrameParams make_frame_params(const VolumeInfo &info, const Camera &camera, ImageSize size,
@@ -201,7 +218,7 @@ ScreenBox make_screen_box(const FrameParams &frame) {
   const View &view = frame.view;
   const Surface &surface = frame.surface;
   if (surface.active_end_x == 0) return {};
-  const glm::dvec2 size(view.width, view.height);
+  const glm::dvec2 num_rays(view.width, view.height), size = double(view.stride) * num_rays;
   const glm::dmat3 basis(glm::dvec3(view.fwd_x, view.fwd_y, view.fwd_z),
                          glm::dvec3(view.right_x, view.right_y, view.right_z),
                          glm::dvec3(view.up_x, view.up_y, view.up_z));
@@ -246,14 +263,14 @@ ScreenBox make_screen_box(const FrameParams &frame) {
       end = size;
       break;
     }
-    // See make_ray(): u = (2 column + 1 - width) pixel_scale, v = (height - 1 - 2 row) pixel_scale.
+    // See twice_u(), twice_v(): of places in squares of stride x stride, each of which has a ray.
     const glm::dvec2 projected = 0.5 * (size - 1.0) + glm::dvec2(in_view.y, -in_view.z) /
                                                           ((is_parallel ? 1 : in_view.x) * pixel);
     begin = glm::min(begin, projected - margin);
     end = glm::max(end, projected + margin + 1.0);
   }
-  begin = glm::clamp(glm::floor(begin), glm::dvec2(0), size);
-  end = glm::clamp(glm::ceil(end), glm::dvec2(0), size);
+  begin = glm::clamp(glm::floor(begin / double(view.stride)), glm::dvec2(0), num_rays);
+  end = glm::clamp(glm::ceil(end / double(view.stride)), glm::dvec2(0), num_rays);
   if (begin.x >= end.x || begin.y >= end.y) return {};
   return {.begin_x = static_cast<uint>(begin.x) / 8 * 8,
           .begin_y = static_cast<uint>(begin.y) / 4 * 4,

@@ -16,15 +16,26 @@ namespace isowave::core {
 struct ImageSize {
   std::uint32_t width = 1280, height = 720;  ///< pixels
   std::uint32_t samples = 1;                 ///< rays of a pixel along each axis, 1..kMaxSamples
+  /// Odd. Above 1, only a sample of the rays is drawn: one in each square of stride x stride rays
+  /// (place_of_ray()), and a few beside the picture (is_in_picture()). A sample has no picture.
+  std::uint32_t stride = 1;
 
-  static constexpr std::uint32_t kMaxSamples = 8;
+  static constexpr std::uint32_t kMaxSamples = 8, kMaxStride = 255;
   std::uint64_t num_pixels() const { return std::uint64_t(width) * height; }
-  std::uint32_t ray_columns() const { return width * samples; }
-  std::uint32_t ray_rows() const { return height * samples; }
-  std::uint64_t num_rays() const { return num_pixels() * samples * samples; }
+  std::uint32_t ray_columns() const { return in_sample(width * samples); }
+  std::uint32_t ray_rows() const { return in_sample(height * samples); }
+  std::uint64_t num_rays() const { return std::uint64_t(ray_columns()) * ray_rows(); }
+
+ private:
+  /// The squares' middle is the picture's, so both are odd or even numbers of rays wide.
+  std::uint32_t in_sample(std::uint32_t rays) const {
+    if (stride == 1) return rays;
+    const std::uint32_t squares = (rays + stride - 1) / stride;
+    return squares + (squares + rays) % 2;
+  }
 };
 
-/// Throws  Error: an image of 0 pixels, more than 2^28 rays, samples out of range
+/// Throws  Error: an image of 0 pixels, more than 2^28 rays, samples or stride out of range
 void check_image_size(ImageSize size);
 
 /// A picture of half the rays, so many times, along each axis, rounded up: one for each pixel. 0
@@ -73,6 +84,11 @@ FrameParams make_grid_params(const VolumeInfo &info);
 /// Throws  Error: a degenerate camera, or one too far away; what check_distances() or
 ///         check_image_size() refuses
 View make_view(const VolumeInfo &info, const Camera &camera, ImageSize size);
+
+/// Whether a ray of a sample is one of the picture's.
+///
+/// view  make_view() of that size
+bool is_in_picture(const View &view, ImageSize size, std::uint32_t ray);
 
 /// The rays, as make_ray() rounds them, that may meet the surface's active box, by a frame's grid,
 /// brick, view and surface.

@@ -32,6 +32,7 @@
 ISO_NAMESPACE_BEGIN
 
 #define ISO_AXIS_START 3  ///< axis of the event "the ray starts here"
+#define ISO_SAMPLE_SEED 0x9e3779b9u  ///< of samples of rays, see place_of_ray()
 #define ISO_SMALLEST_DIRECTION \
   0x1p-40f  ///< smaller direction components count as 0: no denormals behind them
 
@@ -98,15 +99,45 @@ ISO_INLINE RayAxis make_camera_axis(uint is_parallel, float u, float v, float le
                           : make_ray_axis(eye, fma(v, up, fma(u, right, fwd)) / length);
 }
 
+typedef struct RayPlace {
+  int column, row;
+} RayPlace;
+
+/// The place of a ray in a grid of stride * width x stride * height places. If the stride is 1, the
+/// places are the rays. Otherwise, the rays are a sample of a frame's: each square of stride x
+/// stride places has one ray, at a place that is chosen by a hash (lowbias32, C. Wellons).
+ISO_INLINE RayPlace place_of_ray(const View *view, int column, int row) {
+  RayPlace place;
+  place.column = column;
+  place.row = row;
+  if (view->stride > 1) {
+    uint hash = (uint)column + view->width * (uint)row + ISO_SAMPLE_SEED;
+    hash = (hash ^ (hash >> 16)) * 0x7feb352du;
+    hash = (hash ^ (hash >> 15)) * 0x846ca68bu;
+    hash ^= hash >> 16;
+    place.column = (int)((uint)column * view->stride + ((hash & 0xffffu) * view->stride >> 16));
+    place.row = (int)((uint)row * view->stride + ((hash >> 16) * view->stride >> 16));
+  }
+  return place;
+}
+
+/// Twice u and v of a place, in rays, from the middle of the picture.
+ISO_INLINE int twice_u(const View *view, int column) {
+  return 2 * column + 1 - (int)(view->stride * view->width);
+}
+ISO_INLINE int twice_v(const View *view, int row) {
+  return (int)(view->stride * view->height) - 1 - 2 * row;
+}
+
 /// The ray of a pixel (row-major, row 0 at the top). Its direction is (fwd + u right + v up) /
 /// sqrt(1 + u^2 + v^2), mapped to index space; t * frame->view.t_scale is the distance from the eye
 /// in world units. A parallel ray's direction is fwd; its distance is that from the eye's plane.
 ISO_INLINE Ray make_ray(const FrameParams *frame, uint pixel) {
-  const int column = (int)(pixel % frame->view.width);
-  const int row = (int)(pixel / frame->view.width);
+  const RayPlace place = place_of_ray(&frame->view, (int)(pixel % frame->view.width),
+                                      (int)(pixel / frame->view.width));
   const uint is_parallel = frame->view.is_parallel;
-  const float u = (float)(2 * column + 1 - (int)frame->view.width) * frame->view.pixel_scale;
-  const float v = (float)((int)frame->view.height - 1 - 2 * row) * frame->view.pixel_scale;
+  const float u = (float)twice_u(&frame->view, place.column) * frame->view.pixel_scale;
+  const float v = (float)twice_v(&frame->view, place.row) * frame->view.pixel_scale;
   const float length = sqrt(fma(u, u, fma(v, v, 1.0f)));
   Ray r;
   r.x = make_camera_axis(is_parallel, u, v, length, frame->view.eye_x, frame->view.fwd_x,

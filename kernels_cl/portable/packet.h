@@ -168,8 +168,17 @@ ISO_INLINE void make_packet_camera_axis(const View *view, Floats u, Floats v, Fl
 ISO_INLINE void make_packet_axes(const FrameParams *frame, Ints column, Ints row,
                                  PacketAxis *axes) {
   const View *view = &frame->view;
-  const Floats u = to_floats(2 * column + 1 - (int)view->width) * view->pixel_scale;
-  const Floats v = to_floats((int)view->height - 1 - 2 * row) * view->pixel_scale;
+  if (view->stride > 1) {
+    ISO_EACH_LANE(lane, ints(-1)) {
+      const RayPlace place = place_of_ray(view, column[lane], row[lane]);
+      column[lane] = place.column;
+      row[lane] = place.row;
+    }
+  }
+  const Floats u = to_floats(2 * column + 1 - (int)(view->stride * view->width)) *
+                   view->pixel_scale;
+  const Floats v = to_floats((int)(view->stride * view->height) - 1 - 2 * row) *
+                   view->pixel_scale;
   const Floats length = sqrt(fma(u, u, fma(v, v, floats(1.0f))));
   make_packet_camera_axis(view, u, v, length, view->eye_x, view->fwd_x, view->right_x, view->up_x,
                           frame->brick.origin_x, &axes[0]);

@@ -143,8 +143,9 @@ typedef struct View {
   float pixel_scale;
   float t_scale;     ///< power of two: ray parameter t of the kernels -> world units
   uint is_parallel;  ///< 1: all rays have the direction fwd, and start at eye + u right + v up
+  uint stride;       ///< above 1: the rays are a sample of those of a frame, see place_of_ray()
 } View;
-ISO_CHECK_SIZE(View, 68);
+ISO_CHECK_SIZE(View, 72);
 
 /// The part of the rays that one level of detail draws [t of the kernels].
 typedef struct Band {
@@ -191,7 +192,7 @@ typedef struct FrameParams {
   ScreenBox screen;
   Schedule schedule;
 } FrameParams;
-ISO_CHECK_SIZE(FrameParams, 220);
+ISO_CHECK_SIZE(FrameParams, 224);
 
 #define ISO_NO_HIT 64u  ///< PairHit::cell of a pair that was tested and misses
 #define ISO_NOT_TESTED \

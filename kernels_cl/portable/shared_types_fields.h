@@ -17,7 +17,7 @@
   X(view.width) X(view.height)                                                                 \
   X(view.eye_x) X(view.eye_y) X(view.eye_z) X(view.fwd_x) X(view.fwd_y) X(view.fwd_z)          \
   X(view.right_x) X(view.right_y) X(view.right_z) X(view.up_x) X(view.up_y) X(view.up_z)       \
-  X(view.pixel_scale) X(view.t_scale) X(view.is_parallel)                                      \
+  X(view.pixel_scale) X(view.t_scale) X(view.is_parallel) X(view.stride)                       \
   X(band.begin_t) X(band.end_t)                                                                \
   X(surface.isovalue) X(surface.isovalue_index)                                                \
   X(surface.active_begin_x) X(surface.active_begin_y) X(surface.active_begin_z)                \

@@ -81,7 +81,7 @@ void set_wanted(RenderArgs &options) {
   wanted.with_shading = asks_for_picture(options);
   wanted.with_kept_picture = options.time_budget.has_value();
   wanted.with_given_rays = options.ambient_rays != 0;
-  wanted.with_bounds = options.max_surface_error.has_value();
+  wanted.with_bounds = draws_bounds(options);
   options.frame.compression.measure_error |= wanted.with_bounds;
   if (!wanted.with_shading) options.normals = to_string(Normals::kCell);  // no picture shows them
 }
@@ -177,8 +177,8 @@ void make_renderer(RenderArgs &options, Drawing &drawing) {
   drawing.renderer = std::make_unique<isowave::Renderer::Implementation>(
       std::make_shared<Turns>(), drawing.volume(),
       add_choices(make_core_renderer(options, drawing),
-                  {.with_bounds = wanted.with_bounds, .with_time_budget = wanted.with_kept_picture},
-                  drawing.volume(), drawing.bricks ? drawing.bricks->rate : drawing.whole.rate()));
+                  {.with_time_budget = wanted.with_kept_picture}, drawing.volume(),
+                  drawing.bricks ? drawing.bricks->rate : drawing.whole.rate()));
   if (drawing.on_device != nullptr) options.renderer = drawing.on_device->options();
 }
 
@@ -217,10 +217,11 @@ isowave::FrameRequest FrameOfMany::request() const {
   request.normals = static_cast<isowave::Normals>(normals_from_string(options.normals));
   request.ambient_rays = options.ambient_rays;
   request.max_surface_error = options.max_surface_error;
+  if (options.by == "sample") request.by = isowave::Evidence::kSample;
   request.time_budget_ms = options.time_budget;
   request.want_picture = !options.image.empty();
   request.want_depth = !options.depth.empty();
-  request.want_bounds = options.max_surface_error.has_value();
+  request.want_bounds = draws_bounds(options);
   if (options.progress_dir.empty()) return request;
   request.on_pass = [this](const isowave::Progress &progress) {
     const fs::path name =
@@ -246,8 +247,11 @@ void FrameOfMany::write_outputs(const Frame &frame) const {
 void FrameOfMany::report_error(const Frame &frame, ordered_json &entry) const {
   together(drawing.team, [&] {
     if (drawing.team.rank() != 0) return;
-    entry["error"] = tools::report_error(*options.max_surface_error, drawing.volume(),
-                                         drawing.renderer->last(), frame, path(options.error_map));
+    const LastFrame &last = drawing.renderer->last();
+    entry["error"] = draws_bounds(options)
+                         ? tools::report_error(*options.max_surface_error, drawing.volume(), last,
+                                               frame, path(options.error_map))
+                         : report_sample(*options.max_surface_error, last.stats.detail.value());
   });
 }
 

@@ -60,12 +60,20 @@ bool asks_for_picture(const RenderArgs &options) {
   return !options.image.empty() || !options.progress_dir.empty() || !options.refined.empty();
 }
 
+bool draws_bounds(const RenderArgs &options) {
+  return options.max_surface_error && options.by == "proof";
+}
+
 namespace {
 
 /// Checks --max-surface-error, --time-budget and the options that need them.
 void check_choice(const RenderArgs &options) {
+  if (options.by == "sample" && !options.max_surface_error)
+    throw Error("--by sample needs --max-surface-error");
   if (!options.max_surface_error && !options.error_map.empty())
     throw Error("--error-map needs --max-surface-error");
+  if (!draws_bounds(options) && !options.error_map.empty())
+    throw Error("--error-map has proven bounds: leave out --by sample");
   if (!options.time_budget && !options.refined.empty())
     throw Error("--refined needs --time-budget");
   if (!options.max_surface_error && !options.time_budget) return;
@@ -162,7 +170,7 @@ void group_render_options(CLI::App &command) {
   group_volume_options(command);
   group_compression_options(command);
   group_options(command, "Precision and time",
-                {"--voxel-pixels", "--voxel-error", "--max-surface-error", "--error-map",
+                {"--voxel-pixels", "--voxel-error", "--max-surface-error", "--by", "--error-map",
                  "--time-budget", "--refined"});
   group_options(command, "Memory", {"--memory-budget", "--cache-slots", "--stream", "--verbose"});
   group_options(command, "Several processes, by mpirun", {"--bricks"});
@@ -213,7 +221,14 @@ void add_render_options(CLI::App &command, RenderArgs &options) {
       "--max-surface-error", options.max_surface_error,
       "largest distance to the surface of the uncompressed volume [pixels]: levels of detail and "
       "bit planes are chosen so that most pixels keep it, and the share of certain pixels is "
-      "printed");
+      "printed; see --by");
+  command
+      .add_option("--by", options.by,
+                  "evidence for --max-surface-error. proof: bounds of each pixel's error. sample: "
+                  "with 95 % confidence, 99 % of the rays that hit are so near to the surface at "
+                  "full detail, judged by some of them; saves blocks of turbulent volumes, too")
+      ->check(CLI::IsMember({"proof", "sample"}))
+      ->capture_default_str();
   command.add_option(
       "--error-map", options.error_map,
       "float32 .npy [H,W] for --max-surface-error: the bound of each pixel, or ray; inf: there "

@@ -28,6 +28,7 @@ struct RenderArgs {
   std::string color = "#DBBD87", background = "#FFFFFF";
   std::string image, depth, stats, progress_dir, error_map, refined;
   std::optional<double> max_surface_error;  ///< pixels
+  std::string by = "proof";                 ///< or "sample": FrameRequest::by
   std::optional<double> time_budget;        ///< ms
   double voxel_pixels = 0;                  ///< FrameRequest::voxel_pixels
   std::string normals = "smooth";
@@ -51,6 +52,8 @@ std::string default_image(const RenderArgs &options, std::size_t num_views);
 bool asks_for_output(const RenderArgs &options);
 /// Whether a picture is written.
 bool asks_for_picture(const RenderArgs &options);
+/// Whether bounds of the error are drawn: for --max-surface-error, by proof.
+bool draws_bounds(const RenderArgs &options);
 
 /// Throws  Error: what can be told from the options alone
 void check_options(const CLI::App &command, const RenderArgs &options, const Team &team);

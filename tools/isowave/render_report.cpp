@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "core/accuracy/ray_sample.hpp"
 #include "core/io/npy.hpp"
 #include "core/zfp/describe_compression.hpp"
 #include "tools/isowave/program.hpp"
@@ -15,6 +16,16 @@ namespace {
 
 nlohmann::ordered_json detail_json(const Detail &detail) {
   return {{"voxel_pixels", detail.voxel_pixels}, {"voxel_error", detail.voxel_error}};
+}
+
+/// share: the name of a share of the pixels that keep the error
+nlohmann::ordered_json tries_json(const DetailChoice &choice, const char *share) {
+  nlohmann::ordered_json tries = nlohmann::ordered_json::array();
+  for (const DetailChoice::Try &each : choice.tries) {
+    tries.push_back(detail_json(each.detail));
+    tries.back()[share] = each.kept;
+  }
+  return tries;
 }
 
 /// The source of the errors of a volume's voxels and levels, on which bounds rest.
@@ -42,6 +53,23 @@ nlohmann::ordered_json report_steps(const FrameStats &stats, double budget_ms) {
   return {{"budget_ms", budget_ms}, {"complete", stats.complete}, {"steps", steps}};
 }
 
+nlohmann::ordered_json report_sample(double max_surface_error, const DetailChoice &choice) {
+  const SampledShare &sample = choice.sample.value();
+  fmt::print(
+      "  within {} pixels of the surface at full detail: {:.2f} % of {} sampled hits of {} rays; "
+      "at "
+      "least {:.2f} % of all, with {:.0f} % confidence (Clopper-Pearson)\n"
+      "  with voxels up to {:.3g} pixels apart and values up to {} off; chosen in {:.0f} ms\n",
+      max_surface_error, 100 * sample.share(), with_commas(sample.num_hits),
+      with_commas(sample.num_rays), 100 * sample.lowest, 100 * kConfidence,
+      choice.detail.voxel_pixels, choice.detail.voxel_error, choice.total_ms);
+  return {{"max_surface_error", max_surface_error}, {"by", "sample"},
+          {"chosen", detail_json(choice.detail)},   {"tries", tries_json(choice, "within")},
+          {"choice_ms", choice.total_ms},           {"sampled_rays", sample.num_rays},
+          {"sampled_hits", sample.num_hits},        {"within", sample.num_within},
+          {"lowest_share", sample.lowest},          {"confidence", kConfidence}};
+}
+
 nlohmann::ordered_json report_error(double max_surface_error, const CompressedVolume &volume,
                                     const LastFrame &last, const Frame &frame,
                                     const std::filesystem::path &error_map) {
@@ -66,16 +94,12 @@ nlohmann::ordered_json report_error(double max_surface_error, const CompressedVo
                      choice.advice));
   }
   if (!error_map.empty()) write_npy({frame.columns, frame.rows, frame.bounds}, error_map);
-  nlohmann::ordered_json tries = nlohmann::ordered_json::array();
-  for (const DetailChoice::Try &each : choice.tries) {
-    tries.push_back(detail_json(each.detail));
-    tries.back()["certified"] = each.certified;
-  }
   return {{"max_surface_error", max_surface_error},
+          {"by", "proof"},
           {"errors", errors_of(volume)},
           {"reachable", choice.reachable},
           {"chosen", detail_json(choice.detail)},
-          {"tries", tries},
+          {"tries", tries_json(choice, "certified")},
           {"choice_ms", choice.total_ms},
           {"pixels", summary.num_pixels},
           {"certified", summary.num_certified},

@@ -15,8 +15,10 @@ namespace isowave::core::tools {
 
 /// Prints the steps of a frame within a time budget. Returns their JSON.
 nlohmann::ordered_json report_steps(const FrameStats &stats, double budget_ms);
-/// Prints how far the last frame may be off, and writes its bounds to error_map, if that is not
-/// empty. Returns its JSON.
+/// Prints how the detail of a frame was chosen by sample. Returns its JSON.
+nlohmann::ordered_json report_sample(double max_surface_error, const DetailChoice &choice);
+/// Prints how far the last frame may be off by proof, and writes its bounds to error_map, if that
+/// is not empty. Returns its JSON.
 nlohmann::ordered_json report_error(double max_surface_error, const CompressedVolume &volume,
                                     const LastFrame &last, const Frame &frame,
                                     const std::filesystem::path &error_map);

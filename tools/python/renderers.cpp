@@ -129,6 +129,12 @@ nb::dict frame_dict(isowave::Frame &&frame, bool is_of_rays = false) {
     detail["voxel_error"] = frame.detail->voxel_error;
     detail["reachable"] = frame.detail->reachable;
     detail["advice"] = frame.detail->advice;
+    if (const auto &sample = frame.detail->sample) {
+      detail["sampled_rays"] = sample->num_rays;
+      detail["sampled_hits"] = sample->num_hits;
+      detail["within"] = sample->num_within;
+      detail["lowest_share"] = sample->lowest;
+    }
     statistics["detail"] = detail;
   }
   result["statistics"] = statistics;
@@ -138,12 +144,19 @@ nb::dict frame_dict(isowave::Frame &&frame, bool is_of_rays = false) {
 /// [count][6]
 using RayArray = nb::ndarray<double, nb::ro, nb::shape<-1, 6>, nb::c_contig>;
 
-/// "smooth", "cell"; of a request's enums, Python sets this one alone.
+/// "smooth", "cell".
 isowave::Normals normals_of(const std::string &name) {
   if (name != "smooth" && name != "cell") throw Error("normals '" + name + "': smooth or cell");
   return name == "smooth" ? isowave::Normals::kSmooth : isowave::Normals::kCell;
 }
 
+/// "proof", "sample".
+isowave::Evidence evidence_of(const std::string &name) {
+  if (name != "proof" && name != "sample") throw Error("by '" + name + "': proof or sample");
+  return name == "proof" ? isowave::Evidence::kProof : isowave::Evidence::kSample;
+}
+
+/// Python does not set FrameRequest::bound.
 isowave::FrameRequest request_of(const nb::dict &options) {
   isowave::FrameRequest request;
   const auto get = reader_of(options);
@@ -153,6 +166,10 @@ isowave::FrameRequest request_of(const nb::dict &options) {
       std::string text = "smooth";
       get(name, text);
       field = normals_of(text);
+    } else if constexpr (std::is_same_v<Field, isowave::Evidence>) {
+      std::string text = "proof";
+      get(name, text);
+      field = evidence_of(text);
     } else if constexpr (!std::is_enum_v<Field>) {
       get(name, field);
     }

@@ -20,6 +20,12 @@ namespace isowave {
 /// (kUpper) the voxels before compression.
 enum class FieldBound { kNone, kLower, kUpper };
 
+/// The evidence for FrameRequest::max_surface_error.
+enum class Evidence {
+  kProof,  ///< bounds of most pixels, against the volume before compression
+  kSample  ///< a sample of the frame's rays, against full detail
+};
+
 /// The gradients that hits have. Normals follow from them.
 enum class Normals {
   kSmooth,  ///< central differences, trilinear between voxels
@@ -76,9 +82,12 @@ struct FrameRequest {
   /// Rays from each hit, up to 255, that find out how much of the sky it sees, which shows depth.
   /// Each takes about as long as a frame without any. Needs with_rays.
   std::uint32_t ambient_rays = 0;
-  /// Largest distance to the surface of the volume before compression [pixels]. voxel_pixels and
-  /// voxel_error are then chosen so that most pixels keep it. Needs with_bounds.
+  /// Largest distance to the true surface [pixels]. voxel_pixels and voxel_error are then chosen so
+  /// that most pixels keep it. By proof, the true surface is that of the volume before compression;
+  /// needs with_bounds. By sample, it is that of full detail, and 99 % of the rays that hit it keep
+  /// the error (DetailChoice::sample); to choose levels of detail, needs with_levels.
   std::optional<double> max_surface_error{};
+  Evidence by = Evidence::kProof;  ///< for max_surface_error; kProof without one
   /// Time in which the largest picture possible is drawn, small pictures first. Needs
   /// with_time_budget.
   std::optional<double> time_budget_ms{};
@@ -131,6 +140,7 @@ void for_each_field(Request &request, const Visit &visit) {
   visit("normals", request.normals);
   visit("ambient_rays", request.ambient_rays);
   visit("max_surface_error", request.max_surface_error);
+  visit("by", request.by);
   visit("time_budget_ms", request.time_budget_ms);
   visit("want_picture", request.want_picture);
   visit("want_depth", request.want_depth);
@@ -161,11 +171,22 @@ struct FrameStatistics {
   std::map<std::string, double> stage_ms{};  ///< by stage, if the device has profiling
 };
 
+/// How much of a sample of a frame's rays keeps an error (Evidence::kSample).
+struct SampledShare {
+  std::uint64_t num_rays = 0;    ///< rays that were drawn
+  std::uint64_t num_hits = 0;    ///< those that hit with full detail, or with the chosen one
+  std::uint64_t num_within = 0;  ///< those whose two hits are within the error
+  /// Lower end of the one-sided Clopper-Pearson interval of 95 % of num_within / num_hits; 1 at
+  /// full detail.
+  double lowest = 0;
+};
+
 /// The detail that was chosen to keep FrameRequest::max_surface_error.
 struct DetailChoice {
   double voxel_pixels = 0, voxel_error = 0;
   bool reachable = true;  ///< false: this volume cannot keep it; full detail was drawn
   std::string advice{};   ///< what would help if it is not reachable
+  std::optional<SampledShare> sample{};  ///< by sample: with the chosen detail
 };
 
 /// A finished frame. Arrays that were not asked for are empty. Rays are [rows][columns], row 0 at

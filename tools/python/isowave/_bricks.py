@@ -165,8 +165,8 @@ class BrickRenderer(Placed[_core.Renderer]):
     ) -> Image | None:
         """Draws a frame; arguments as Renderer.render(), without positions, time_budget, on_pass.
 
-        `max_error` and the output "bounds" need bounds=True. One Renderer would choose the same
-        detail, and find the same bounds.
+        `max_error` by proof and the output "bounds" need bounds=True. One Renderer would choose the
+        same detail, and find the same bounds.
 
         Returns
         -------

@@ -193,6 +193,7 @@ class Renderer:
         normals: str = "smooth",
         outputs: Sequence[str] = ALL_OUTPUTS,
         max_error: float | None = None,
+        by: str = "proof",
         voxel_pixels: float = 0.0,
         voxel_error: float = 0.0,
         time_budget: float | None = None,
@@ -219,19 +220,20 @@ class Renderer:
         outputs
             Names of the arrays to bring back: "rgb", "depth", "normals", "position", "bounds".
         max_error
-            Largest distance between the drawn surface and that of the volume before compression
-            [pixels]. The detail is chosen so that most pixels keep it. Needs bounds=True.
+            Largest distance between drawn and true surface [pixels], that the detail must keep.
+        by
+            "proof" of max_error, against the volume before compression, which needs bounds=True; or
+            "sample": 99 % of the hits keep it, against full detail, as some rays show. Needs
+            levels=True; see statistics["detail"].
         voxel_pixels
-            Largest distance between voxels of a coarser level of detail [pixels]; 0: full detail.
-            Needs levels=True.
+            Largest distance between voxels of coarser levels [pixels]; 0: none. Needs levels=True.
         voxel_error
             Largest difference of decoded voxels from the compressed ones [voxel values].
         time_budget
             Draws the best picture possible in so many seconds. Needs time_budget=True.
         ambient
-            Rays from each hit, up to 255, that find out how much of the sky it sees, which shows
-            depth. 16 and more look smooth. Each takes about as long as a frame without any. Needs
-            rays=True.
+            Rays from each hit, up to 255, that find out how much of the sky it sees. 16 and more
+            look smooth. Each takes about as long as a frame without any. Needs rays=True.
         on_pass
             Called after each pass with the picture so far. If it returns False, the frame stops.
 
@@ -251,6 +253,7 @@ class Renderer:
                 normals,
                 outputs,
                 max_error,
+                by,
                 voxel_pixels,
                 voxel_error,
                 time_budget,

@@ -60,6 +60,7 @@ class Request:
     normals: str = "smooth"
     outputs: Sequence[str] = ALL_OUTPUTS
     max_error: float | None = None
+    by: str = "proof"
     voxel_pixels: float = 0.0
     voxel_error: float = 0.0
     time_budget: float | None = None
@@ -82,6 +83,7 @@ class Request:
             "normals": normals_of(self.normals),
             "outputs": outputs,
             "max_error": optional("max_error", self.max_error),
+            "by": evidence_of(self.by),
             "voxel_pixels": number("voxel_pixels", self.voxel_pixels),
             "voxel_error": number("voxel_error", self.voxel_error),
             "time_budget": optional("time_budget", self.time_budget),
@@ -94,9 +96,14 @@ class Request:
     @property
     def needs(self) -> dict[str, str]:
         """Options that a renderer needs to draw this, and the argument that needs each option."""
+        by_proof = self.max_error is not None and self.by == "proof"
+        by_sample = self.max_error is not None and self.by == "sample"
         asked = {
-            "bounds": ("max_error", self.max_error is not None or "bounds" in self.outputs),
-            "levels": ("voxel_pixels", self.voxel_pixels > 0),
+            "bounds": ("max_error", by_proof or "bounds" in self.outputs),
+            "levels": (
+                "max_error" if by_sample else "voxel_pixels",
+                by_sample or self.voxel_pixels > 0,
+            ),
             "time_budget": ("time_budget", self.time_budget is not None),
             "rays": ("ambient", self.ambient != 0),
         }
@@ -121,6 +128,7 @@ class Request:
             "voxel_pixels": self.voxel_pixels,
             "voxel_error": self.voxel_error,
             "max_surface_error": self.max_error,
+            "by": self.by,
             "time_budget_ms": None if self.time_budget is None else 1000 * self.time_budget,
             "ambient_rays": self.ambient,
             "want_picture": "rgb" in self.outputs,
@@ -159,6 +167,12 @@ def normals_of(normals: str) -> str:
     if normals not in ("smooth", "cell"):
         raise ValueError(f"normals {normals!r}: give 'smooth' or 'cell'")
     return normals
+
+
+def evidence_of(by: str) -> str:
+    if by not in ("proof", "sample"):
+        raise ValueError(f"by {by!r}: give 'proof' or 'sample'")
+    return by
 
 
 def optional(name: str, value: Any) -> float | None:

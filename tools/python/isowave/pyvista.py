@@ -171,6 +171,7 @@ def add_isosurface(
     color: Color | None = None,
     device: str | int | None = None,
     max_error: float | None = None,
+    by: str = "proof",
     voxel_pixels: float = 0.0,
     normals: str = "smooth",
     memory_budget: int | None = None,
@@ -195,7 +196,7 @@ def add_isosurface(
         "#rrggbb", or red, green, blue from 0 to 1.
     device, memory_budget
         As for Volume.render.
-    max_error, voxel_pixels, normals
+    max_error, by, voxel_pixels, normals
         As for Renderer.render.
     reset_camera
         Whether to set the camera so that all of the scene is seen; None: unless it was set.
@@ -214,6 +215,7 @@ def add_isosurface(
         normals=normals,
         outputs=("rgb", "depth"),
         max_error=max_error,
+        by=by,
         voxel_pixels=voxel_pixels,
     )
     surface = Isosurface(plotter, volume, request, device=device, memory_budget=memory_budget)

@@ -227,6 +227,7 @@ def test_device_and_host_draw_the_same_bits(volume):
 
 def test_the_host_draws_all_that_a_device_draws():
     options = {"voxel_pixels": 2.0}, {"max_error": 1.0}, {"time_budget": 1e6}, {"ambient": 2}
+    options += ({"max_error": 1.0, "by": "sample"},)
     finer = isowave.compress(sphere_voxels(), tolerance=0.01, levels=3)
     needed = {"levels": True, "bounds": True, "time_budget": True, "rays": True}
     on_device, on_host = finer.renderer(size=SIZE, **needed), host_renderer(finer)
@@ -381,6 +382,16 @@ def test_errors_are_kept_and_bounds_given():
     stopped = volume.render(10, size=SIZE, time_budget=1000.0, on_pass=stop)
     assert shapes == [(6, 8, 3)] and not stopped.complete
     assert stopped.rgb.shape == (48, 64, 3)
+
+
+def test_an_error_is_kept_by_sample():
+    volume = isowave.compress(sphere_voxels((40, 44, 48)), tolerance=0.001, levels=0)
+    image = volume.render(10, size=SIZE, max_error=1.0, by="sample", device="host")
+    detail = image.statistics["detail"]
+    assert detail["reachable"] and 0.99 <= detail["lowest_share"] <= 1
+    assert 299 <= detail["within"] <= detail["sampled_hits"] <= detail["sampled_rays"] == 64 * 48
+    with pytest.raises(isowave.Error, match="give max_surface_error"):
+        volume.render(10, size=SIZE, by="sample")
 
 
 def test_bad_requests_are_one_line(volume, renderer):

@@ -32,6 +32,7 @@ WISH: dict[str, Any] = {
     "background": [1, 1, 0],
     "samples": 1,
     "max_error": None,
+    "by": "proof",
     "time_budget": None,
     "ambient": 0,
 }
@@ -57,7 +58,7 @@ class Front:
         self.heads = list[dict[str, Any]]()
         self.pictures = list[bytes]()
         self.session = Session(scene, self._take)
-        self.session.receive({"type": "hello", "version": 2})
+        self.session.receive({"type": "hello", "version": 3})
 
     def _take(self, head: dict[str, Any], data: bytes | None) -> None:
         with self.changed:

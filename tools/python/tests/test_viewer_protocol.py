@@ -29,22 +29,24 @@ WISH: dict[str, Any] = {
     "background": [1, 1, 1],
     "samples": 2,
     "max_error": 0.5,
+    "by": "sample",
     "time_budget": None,
     "ambient": 16,
 }
 
 
 def test_messages_are_read() -> None:
-    assert check({"type": "hello", "version": 2}) == Hello()
+    assert check({"type": "hello", "version": 3}) == Hello()
     assert check({"type": "ack", "frame": 3}) == Ack(3)
     assert check({"type": "budget", "bytes": None}) == Budget(None)
     assert check({"type": "budget", "bytes": 5}) == Budget(5)
     camera = Camera((0, 0, 5), (0, 0, 0), (0, 1, 0), 60)
     colors: dict[str, Any] = {"color": (1, 0.5, 0), "background": (1, 1, 1), "outputs": ("rgb",)}
-    asked = Request(80, camera, (64, 48), 2, **colors, max_error=0.5, ambient=16)
+    asked = Request(80, camera, (64, 48), 2, **colors, max_error=0.5, by="sample", ambient=16)
     assert check(parse(json.dumps(WISH))) == Wish(7, asked)
     timed = check({**WISH, "max_error": None, "time_budget": 50})
     assert isinstance(timed, Wish) and timed.request.time_budget == 0.05  # ms to seconds
+    assert timed.request.by == "proof"  # there is no error to judge
 
 
 BAD_WISHES: list[tuple[dict[str, Any], str]] = [
@@ -69,6 +71,8 @@ BAD_WISHES: list[tuple[dict[str, Any], str]] = [
     ({"background": [0, 0]}, "background"),
     ({"max_error": 0}, "max_error"),
     ({"max_error": -1}, "max_error"),
+    ({"by": "luck"}, "by must be proof or sample"),
+    ({"by": ["proof"]}, "by must be proof or sample"),
     ({"max_error": None, "time_budget": 0.5}, "time_budget"),
     ({"max_error": 1, "time_budget": 100}, "not both"),
     ({"camera": []}, "camera"),
@@ -124,12 +128,12 @@ def test_texts_that_are_refused(text: str, message: str) -> None:
 
 def test_another_version_is_told_to_reload() -> None:
     with pytest.raises(ProtocolError, match="reload"):
-        check({"type": "hello", "version": 3})
+        check({"type": "hello", "version": 4})
 
 
 VALID: list[dict[str, Any]] = [
     WISH,
-    {"type": "hello", "version": 2},
+    {"type": "hello", "version": 3},
     {"type": "ack", "frame": 0},
     {"type": "budget", "bytes": 1 << 30},
     {**WISH, "camera": None},
@@ -196,7 +200,7 @@ def test_fuzz() -> None:
     for i in range(count):
         if session is None:
             session = Session(scene, post, rate=1e9, burst=1e9)
-            session.receive({"type": "hello", "version": 2})
+            session.receive({"type": "hello", "version": 3})
         message = copy.deepcopy(chance.choice(VALID))
         for _ in range(chance.randrange(3)):
             message = mutated(message, chance) if isinstance(message, dict) else message
@@ -226,7 +230,7 @@ def test_fuzz() -> None:
     # Somebody else sees a picture.
     sent.clear()
     other = Session(scene, post)
-    other.receive({"type": "hello", "version": 2})
+    other.receive({"type": "hello", "version": 3})
     other.receive({**WISH, "id": 1})
     while scene.step():
         other.receive({"type": "ack", "frame": sum(h["type"] == "picture" for h in sent)})

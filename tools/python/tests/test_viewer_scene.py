@@ -541,7 +541,7 @@ def test_a_client_whose_transport_fails_is_forgotten() -> None:
 def test_there_are_at_most_so_many_clients() -> None:
     scene = make_scene(FakeVolume(), Clock(), max_clients=2)
     sessions = [Session(scene, lambda head, data: None) for _ in range(3)]
-    hello = {"type": "hello", "version": 2}
+    hello = {"type": "hello", "version": 3}
     sessions[0].receive(hello)
     sessions[1].receive(hello)
     with pytest.raises(ProtocolError, match="too many clients"):
@@ -555,7 +555,7 @@ def test_sessions_begin_with_hello_and_limit_the_rate() -> None:
     session = Session(scene, lambda head, data: None, rate=10, burst=3, clock=clock)
     with pytest.raises(ProtocolError, match="must be hello"):
         session.receive({"type": "ack", "frame": 0})
-    session.receive({"type": "hello", "version": 2})
+    session.receive({"type": "hello", "version": 3})
     session.receive({"type": "ack", "frame": 0})
     with pytest.raises(ProtocolError, match="too many messages"):
         session.receive({"type": "ack", "frame": 0})
@@ -584,7 +584,7 @@ def test_100_reconnects_leave_nothing() -> None:
 
     for i in range(100):
         session = Session(scene, post)
-        session.receive({"type": "hello", "version": 2})
+        session.receive({"type": "hello", "version": 3})
         wish = {"type": "wish", "id": 1, "isovalue": 80, "size": [32, 32], "camera": None}
         wish |= {"color": [1, 1, 1], "background": [0, 0, 0], "samples": 1}
         session.receive(wish | {"max_error": None, "time_budget": None, "ambient": 0})

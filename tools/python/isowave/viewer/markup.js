@@ -43,6 +43,9 @@ const HTML = `
     <label>Largest error <span class="unit"><input name="max_error" type="number"
       min="0.001" max="1000"
       step="any" placeholder="none"> px</span></label>
+    <label title="Evidence that the largest error is kept">Error judged by
+      <select name="by"><option value="proof">proof</option>
+      <option value="sample">sample</option></select></label>
     <label>Samples per pixel <select name="samples"><option value="1">1</option>
       <option value="2">4</option><option value="3">9</option><option value="4">16</option></select>
     </label>

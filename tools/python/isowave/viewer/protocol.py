@@ -8,7 +8,7 @@ looks nowhere.
     {"type": "hello", "version": 1}
     {"type": "wish", "id": 7, "isovalue": 80, "size": [1280, 720], "camera": {...} | null,
      "color": [r, g, b], "background": [r, g, b], "samples": 1, "max_error": 0.5 | null,
-     "time_budget": 100 | null, "ambient": 0}
+     "by": "proof" | "sample", "time_budget": 100 | null, "ambient": 0}
     {"type": "ack", "frame": 3}
     {"type": "budget", "bytes": 600000000 | null}
 
@@ -28,7 +28,7 @@ from typing import Any, Final
 from isowave._camera import Camera
 from isowave._request import Request
 
-VERSION: Final = 2
+VERSION: Final = 3
 MAX_MESSAGE_BYTES: Final = 8192
 MAX_SIDE: Final = 8192  # pixels of a picture along each axis
 MAX_SAMPLES: Final = 8  # rays of a pixel along each axis, as the library has it
@@ -202,6 +202,8 @@ def _read_wish(content: dict[str, Any]) -> Wish:
         raise ProtocolError("a picture keeps max_error or time_budget, not both")
     if not isinstance(size, list) or len(size) != 2:
         raise ProtocolError("size must be two integers")
+    if content["by"] not in ("proof", "sample"):
+        raise ProtocolError("by must be proof or sample")
     time_budget = _optional(content["time_budget"], 1, MAX_TIME_BUDGET, "time_budget")
     request = Request(
         isovalue=_number(content["isovalue"], -MAX_FLOAT32, MAX_FLOAT32, "isovalue"),
@@ -212,6 +214,7 @@ def _read_wish(content: dict[str, Any]) -> Wish:
         background=_triple(content["background"], 0, 1, "background"),
         outputs=("rgb",),
         max_error=_optional(content["max_error"], 1e-3, 1e3, "max_error"),
+        by=content["by"] if content["max_error"] is not None else "proof",
         time_budget=None if time_budget is None else time_budget / 1000,
         ambient=_integer(content["ambient"], 0, MAX_AMBIENT, "ambient"),
     )
@@ -231,8 +234,8 @@ _READERS: Final[dict[str, tuple[dict[str, None], Callable[[dict[str, Any]], Mess
     "hello": (dict.fromkeys(("type", "version")), _read_hello),
     "wish": (
         dict.fromkeys(
-            "type id isovalue size camera color background samples max_error time_budget"
-            " ambient".split()
+            "type id isovalue size camera color background samples max_error by"
+            " time_budget ambient".split()
         ),
         _read_wish,
     ),

@@ -294,7 +294,7 @@ class Scene:
             on_pass=lambda so_far: self._on_pass(frame, so_far),
         )
         if frame.by_host:  # full detail until the device draws, not interrupted by a time
-            request = replace(request, max_error=None, time_budget=None)
+            request = replace(request, max_error=None, by="proof", time_budget=None)
         image = renderer.draw(request)
         if frame.stopped:
             self._show_what_there_is(frame, image)

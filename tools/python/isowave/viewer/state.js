@@ -4,7 +4,8 @@
 /** @typedef {[number, number, number]} Vec */
 /** @typedef {{eye: Vec, at: Vec, up: Vec, fovy_deg: number}} Camera world space */
 /** @typedef {{isovalue: number, camera: ?Camera, color: string, background: ?string,
- *    samples: number, max_error: ?number, time_budget: ?number, ambient: number}} State
+ *    samples: number, max_error: ?number, by: string, time_budget: ?number,
+ *    ambient: number}} State
  *    what the URL keeps */
 
 const AMBIENT = [8, 16, 32, 64]; // rays of a hit that one can choose
@@ -115,6 +116,7 @@ export function writeHash(state) {
   if (state.background) parts.background = state.background.slice(1);
   if (state.samples > 1) parts.samples = state.samples;
   if (state.max_error) parts.error = short(state.max_error);
+  if (state.max_error && state.by === "sample") parts.by = state.by;
   if (state.time_budget) parts.ms = short(state.time_budget);
   if (state.ambient) parts.ambient = state.ambient;
   if (camera) {
@@ -144,6 +146,7 @@ export function readHash(hash) {
     background: color("background"),
     samples: [1, 2, 3, 4].find((n) => n === number("samples", 1, 4)),
     max_error: number("error", 0.001, 1000),
+    by: ["proof", "sample"].find((by) => by === parts.get("by")),
     time_budget: parts.has("error") ? undefined : number("ms", 1, 10000),
     ambient: [0, ...AMBIENT].find((n) => n === number("ambient", 0, 255)),
   };

@@ -28,7 +28,7 @@
  *    isDark: () => boolean}} Home where a view is. wheel: whether the wheel is the view's
  */
 
-const VERSION = 2;
+const VERSION = 3;
 const MIN_WAIT_MS = 15; // between two wishes
 const MAX_IN_WAIT_MS = 120; // for a picture of the last wish, before the next one is sent
 const MAX_PIXEL_RATIO = 2;
@@ -64,7 +64,7 @@ class View {
     this.field = (name) => this.find(`[name=${name}]`);
     /** @type {State} */
     this.state = { isovalue: NaN, camera: null, color: "#dbbd87", background: null, samples: 1,
-      max_error: null, time_budget: null, ambient: 0 };
+      max_error: null, by: "proof", time_budget: null, ambient: 0 };
     if (home.hash) Object.assign(this.state, readHash(location.hash));
     this.wish = 0;
     this.shown = this.arrived = { wish: -1, frame: -1 };
@@ -200,7 +200,8 @@ class View {
   }
 
   showFacts(head) {
-    const detail = this.state.max_error ? `most pixels within ${toText(this.state.max_error)} px`
+    const share = this.state.by === "sample" ? "99 % of the hits" : "most pixels";
+    const detail = this.state.max_error ? `${share} within ${toText(this.state.max_error)} px`
       : "at full detail";
     const certain = !head.complete ? "the time was over: not complete"
       : head.detail?.reachable === false ? head.detail.advice || "that error is out of reach"
@@ -345,6 +346,7 @@ class View {
     this.field("samples").value = state.samples;
     this.field("ambient").value = state.ambient;
     this.set("max_error", state.max_error ?? "");
+    this.field("by").value = state.by;
     this.set("time_budget", state.time_budget ?? "");
     this.drawHistogram();
   }
@@ -497,6 +499,7 @@ class View {
     number("isovalue", "input");
     number("max_error", "change", null);
     number("time_budget", "change", null);
+    on(this.field("by"), "change", (e) => this.change({ by: e.target.value }));
     number("samples", "change");
     number("ambient", "change");
     on(this.field("slider"), "input", (e) => this.change({ isovalue: Number(e.target.value) }));

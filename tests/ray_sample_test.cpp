@@ -1,0 +1,348 @@
+// A sample of a frame's rays, and the detail that is chosen by it.
+
+#include "core/accuracy/ray_sample.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <map>
+#include <random>
+
+#include "core/accuracy/bounded_renderer.hpp"
+#include "core/accuracy/with_choices.hpp"
+#include "core/base/error.hpp"
+#include "core/host/host_renderer.hpp"
+#include "core/render/device_renderer.hpp"
+#include "kernels_cl/portable/grid_dda.h"
+#include "reference/twin_renderer.hpp"
+#include "tests/frame_scene.hpp"
+#include "tests/test_devices.hpp"
+
+namespace isowave::core {
+namespace {
+
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+/// All levels of detail, and no bounds of errors.
+CompressedVolume levels_of_field(const glm::uvec3 &dims, const test::VoxelFunction &field,
+                                 CompressOptions how = {.rate = 16}) {
+  const std::vector<float> voxels = test::sample(dims, field);
+  test::ArrayReader reader(test::grid_info(dims), voxels);
+  how.levels = 0;
+  return compress(reader, how);
+}
+
+/// The frame's ray at the place of a sample's ray; none if it is beside the picture.
+std::optional<std::uint32_t> ray_in_frame(const View &view, ImageSize size, std::uint32_t ray) {
+  const RayPlace place =
+      place_of_ray(&view, static_cast<int>(ray % view.width), static_cast<int>(ray / view.width));
+  const int columns = static_cast<int>(size.width * size.samples),
+            rows = static_cast<int>(size.height * size.samples),
+            column = (twice_u(&view, place.column) + columns - 1) / 2,
+            row = (rows - 1 - twice_v(&view, place.row)) / 2;
+  if (column < 0 || row < 0 || column >= columns || row >= rows) return {};
+  return static_cast<std::uint32_t>(row * columns + column);
+}
+
+TEST(RaySample, IsOfTheFramesOwnRays) {
+  const VolumeInfo info = test::grid_info({20, 30, 40});
+  Camera camera = orbit_cameras(info, 1)[0];
+  for (const bool is_parallel : {false, true}) {
+    if (is_parallel) camera = in_parallel(camera);
+    for (const ImageSize frame : {ImageSize{320, 240}, ImageSize{201, 90, 3}, ImageSize{7, 5}}) {
+      for (const std::uint32_t stride : {1u, 3u, 7u}) {
+        ImageSize size = frame;
+        size.stride = stride;
+        const FrameParams all = make_frame_params(info, camera, frame, 1),
+                          some = make_frame_params(info, camera, size, 1);
+        EXPECT_EQ(size.num_rays(), std::uint64_t{some.view.width} * some.view.height);
+        std::map<std::uint32_t, int> times;
+        for (std::uint32_t ray = 0; ray < size.num_rays(); ++ray) {
+          const std::optional<std::uint32_t> in_frame = ray_in_frame(some.view, size, ray);
+          ASSERT_EQ(is_in_picture(some.view, size, ray), in_frame.has_value());
+          if (!in_frame) continue;
+          EXPECT_EQ(++times[*in_frame], 1);
+          const Ray expected = make_ray(&all, *in_frame), got = make_ray(&some, ray);
+          EXPECT_EQ(got.x.o, expected.x.o);
+          EXPECT_EQ(got.x.d, expected.x.d);
+          EXPECT_EQ(got.y.d, expected.y.d);
+          EXPECT_EQ(got.z.d, expected.z.d);
+        }
+        const double expected = double(frame.num_rays()) / (stride * stride);
+        EXPECT_NEAR(double(times.size()), expected, 3 * std::sqrt(expected) + 1);
+        if (stride == 1) EXPECT_EQ(times.size(), frame.num_rays());
+      }
+    }
+  }
+}
+
+/// Over the squares of a large picture, all places in a square are taken about as often.
+TEST(RaySample, TakesAllPlacesAlike) {
+  ImageSize size{1280, 720};
+  size.stride = 5;
+  const VolumeInfo info = test::grid_info({20, 30, 40});
+  const View view = make_view(info, orbit_cameras(info, 1)[0], size);
+  std::array<int, 25> times{};
+  for (int row = 0; row < int(view.height); ++row) {
+    for (int column = 0; column < int(view.width); ++column) {
+      const RayPlace place = place_of_ray(&view, column, row);
+      ++times.at(static_cast<std::size_t>(place.column - 5 * column + 5 * (place.row - 5 * row)));
+    }
+  }
+  const double expected = double(size.num_rays()) / 25;
+  double chi_squared = 0;
+  for (const int each : times) chi_squared += (each - expected) * (each - expected) / expected;
+  EXPECT_LT(chi_squared, 43) << "of 24 degrees of freedom, 99 %";
+}
+
+TEST(RaySample, HasAboutTheSameSizeForAllPictures) {
+  for (const ImageSize size : {ImageSize{64, 48}, ImageSize{640, 360}, ImageSize{1280, 720},
+                               ImageSize{3840, 2160, 2}, ImageSize{16384, 16384}}) {
+    const ImageSize sample = sample_of(size);
+    EXPECT_EQ(sample.stride % 2, 1u);
+    EXPECT_GE(sample.num_rays(), std::min<std::uint64_t>(size.num_rays(), 8000));
+    EXPECT_LE(sample.num_rays(), 34000u);
+  }
+  ImageSize even{64, 48};
+  even.stride = 2;
+  EXPECT_THAT([&] { check_image_size(even); }, ThrowsMessage<Error>(HasSubstr("one in 2 rays")));
+}
+
+/// The probability that of n rays k or more are within, each with probability p.
+double tail(int n, int k, double p) {
+  double sum = 0;
+  for (int i = k; i <= n; ++i)
+    sum += std::exp(std::lgamma(n + 1) - std::lgamma(i + 1) - std::lgamma(n - i + 1) +
+                    i * std::log(p) + (n - i) * std::log1p(-p));
+  return sum;
+}
+
+TEST(RaySample, LowestShareIsClopperPearsons) {
+  for (const auto &[within, hits] :
+       {std::pair{299, 299}, {995, 1000}, {50, 100}, {1, 10}, {8000, 8192}}) {
+    const double lowest = lowest_share(within, hits);
+    EXPECT_NEAR(tail(hits, within, lowest), 0.05, 1e-6) << within << " of " << hits;
+    EXPECT_LT(lowest, double(within) / hits);
+  }
+  EXPECT_EQ(lowest_share(0, 10), 0);
+  EXPECT_FALSE(suffices({.num_hits = 298, .num_within = 298}));
+  EXPECT_TRUE(suffices({.num_hits = 299, .num_within = 299}));
+  EXPECT_FALSE(suffices({.num_hits = 5000, .num_within = 4950})) << "99 %, but by chance";
+  EXPECT_TRUE(suffices({.num_hits = 5000, .num_within = 4964}));
+  EXPECT_FALSE(suffices({}));
+}
+
+TEST(RaySample, HitsAreComparedAlongTheRay) {
+  const Camera camera{.eye = {0, 0, 0}, .at = {0, 0, -1}, .fovy_deg = 90};
+  const float no = INFINITY;  // a pixel at distance 100 is 2 units high
+  const SampledShare share =
+      compare_hits(camera, {1, 100}, std::array{100.0f, 100.0f, no, 100.0f, no},
+                   std::array{101.9f, 102.2f, no, no, 100.0f}, 1);
+  EXPECT_EQ(share.num_rays, 5u);
+  EXPECT_EQ(share.num_hits, 4u);
+  EXPECT_EQ(share.num_within, 1u);
+}
+
+FrameRequest request_by_sample(const Camera &camera, ImageSize size, float isovalue,
+                               double max_surface_error) {
+  FrameRequest request{.camera = camera, .isovalue = isovalue, .size = size};
+  request.normals = Normals::kCell;
+  request.max_surface_error = max_surface_error;
+  request.by = Evidence::kSample;
+  return request;
+}
+
+/// A volume, a view and an error, by a seed.
+struct RandomScene {
+  explicit RandomScene(std::uint32_t seed) : random(seed) {
+    const glm::uvec3 dims(between(48, 72), between(48, 72), between(48, 72));
+    std::vector<std::array<glm::dvec3, 2>> waves(6);
+    for (auto &[direction, phase] : waves) {
+      direction =
+          glm::normalize(glm::dvec3(between(-1, 1), between(-1, 1), between(-1, 1)) + 0.01) *
+          (2 * M_PI / between(6, 60));
+      phase = glm::dvec3(between(0, 6));
+    }
+    const double noise = between(0, 0.2), offset = between(-1, 1);
+    const test::VoxelFunction rough = test::noise_field(seed);
+    volume = levels_of_field(dims, [&](const glm::dvec3 &at) {
+      double value = offset + noise * rough(at);
+      for (const auto &[direction, phase] : waves)
+        value += std::sin(glm::dot(direction, at) + phase.x);
+      return value;
+    });
+    camera = orbit_cameras(volume.info, 16)[static_cast<std::size_t>(between(0, 16))];
+    camera.eye = camera.at + between(0.8, 3) * (camera.eye - camera.at);
+    if (between(0, 1) < 0.2) camera = in_parallel(camera);
+    max_surface_error = std::exp2(between(-1, 2));
+  }
+  double between(double low, double high) {
+    return std::uniform_real_distribution(low, high)(random);
+  }
+
+  std::mt19937 random;
+  CompressedVolume volume;
+  Camera camera;
+  double max_surface_error = 1;
+};
+
+/// In at least 95 of 100 scenes, 99 % of all rays keep the error that was judged by a sample. A
+/// judge that always says yes fails.
+TEST(RaySample, PromiseHoldsInRandomScenes) {
+  constexpr ImageSize kSize{240, 180};
+  int num_kept = 0, num_coarse = 0, num_kept_always = 0;
+  for (std::uint32_t seed = 0; seed < 100; ++seed) {
+    const RandomScene scene(seed);
+    HostRenderer renderer(scene.volume);
+    BoundedRenderer bounded(renderer, scene.volume, scene.volume.rate());
+    FrameRequest request = request_by_sample(scene.camera, kSize, 0.3f, scene.max_surface_error);
+    const DetailChoice choice = bounded.render(request).detail.value();
+    const std::vector<float> drawn = bounded.depth();
+    num_coarse += choice.detail.voxel_pixels > 0;
+    const FrameRequest finest{.camera = scene.camera, .isovalue = 0.3f, .size = kSize};
+    renderer.render(finest);
+    const std::vector<float> truth = renderer.depth();
+    const auto is_kept = [&](const std::vector<float> &depth) {
+      return compare_hits(scene.camera, kSize, truth, depth, scene.max_surface_error).share() >=
+             kSampledShare;
+    };
+    num_kept += is_kept(drawn);
+    renderer.render(with_detail(finest, {8, 0}));
+    num_kept_always += is_kept(renderer.depth());
+  }
+  EXPECT_GE(num_kept, 95);
+  EXPECT_GE(num_coarse, 30) << "most of them choose something";
+  EXPECT_LT(num_kept_always, 60) << "the coarsest is not the right choice for all";
+  RecordProperty("kept", num_kept);
+  RecordProperty("coarse", num_coarse);
+}
+
+TEST(RaySample, NeedsNoErrors) {
+  const CompressedVolume volume = levels_of_field({64, 60, 56}, test::gyroid_field(40));
+  HostRenderer renderer(volume);
+  BoundedRenderer bounded(renderer, volume, volume.rate());
+  Camera camera = orbit_cameras(volume.info, 1)[0];
+  camera.eye += 1.5 * (camera.eye - camera.at);
+  FrameRequest request = request_by_sample(camera, {200, 150}, 0.3f, 1);
+  const DetailChoice choice = bounded.render(request).detail.value();
+  EXPECT_GT(choice.detail.voxel_pixels, 0);
+  ASSERT_TRUE(choice.sample);
+  EXPECT_GE(choice.sample->lowest, kSampledShare);
+  EXPECT_EQ(choice.sample->lowest,
+            lowest_share(choice.sample->num_within, choice.sample->num_hits));
+  request.by = Evidence::kProof;
+  EXPECT_THAT([&] { bounded.render(request); }, ThrowsMessage<Error>(HasSubstr("not known")));
+  // Full detail is full detail.
+  const FrameStats tiny = bounded.render(request_by_sample(camera, {12, 8}, 0.3f, 1));
+  EXPECT_EQ(tiny.detail->detail, Detail{}) << "too few rays hit";
+  EXPECT_EQ(tiny.detail->sample->lowest, 1);
+}
+
+TEST(RaySample, BadRequestsAreOneLine) {
+  const CompressedVolume volume = levels_of_field({20, 20, 20}, test::gyroid_field(9));
+  HostRenderer renderer(volume);
+  BoundedRenderer bounded(renderer, volume, volume.rate());
+  FrameRequest request = request_by_sample(orbit_cameras(volume.info, 1)[0], {20, 20}, 0.3f, 1);
+  EXPECT_THAT([&] { renderer.render(request); }, ThrowsMessage<Error>(HasSubstr("no detail")));
+  request.max_surface_error.reset();
+  EXPECT_THAT([&] { bounded.render(request); },
+              ThrowsMessage<Error>(HasSubstr("give max_surface_error")));
+  request.by = Evidence::kProof;
+  request.size->stride = 3;
+  bounded.render(request);
+  EXPECT_THROW(bounded.shade(), std::logic_error) << "a sample is no picture";
+}
+
+class RaySampleOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {};
+INSTANTIATE_TEST_SUITE_P(Devices, RaySampleOnDevice, testing::ValuesIn(devices_under_test()),
+                         device_test_name);
+
+/// A sample has the hits of the frame's rays, at all levels of detail, by all renderers.
+TEST_P(RaySampleOnDevice, SmallSamplesHaveTheFramesHits) {
+  const CompressedVolume volume = levels_of_field({30, 28, 33}, test::gyroid_field(14));
+  const ImageSize frame = is_simulator(GetParam()) ? ImageSize{20, 16} : ImageSize{81, 60};
+  ImageSize some = frame;
+  some.stride = 3;
+  ocl::Device device(GetParam());
+  DeviceRenderer on_device(device, volume, {.size = frame, .with_levels = true});
+  HostRenderer on_host(volume);
+  TwinRenderer twin(volume, frame);
+  Camera camera = orbit_cameras(volume.info, 1)[0];
+  for (const bool is_parallel : {false, true}) {
+    if (is_parallel) camera = in_parallel(camera);
+    const View view = make_view(volume.info, camera, some);
+    for (const double voxel_pixels : {0.0, 6.0}) {
+      FrameRequest request{
+          .camera = camera, .isovalue = 0.2f, .size = frame, .voxel_pixels = voxel_pixels};
+      request.normals = Normals::kCell;
+      on_host.render(request);
+      const std::vector<HitRecord> all = on_host.hits();
+      request.size = some;
+      for (Renderer *renderer :
+           {static_cast<Renderer *>(&on_device), static_cast<Renderer *>(&on_host),
+            static_cast<Renderer *>(&twin)}) {
+        const FrameStats stats = renderer->render(request);
+        EXPECT_EQ(stats.last_level > 0, voxel_pixels > 0 && renderer != &twin);
+        const std::vector<HitRecord> hits = renderer->hits();
+        ASSERT_EQ(hits.size(), some.num_rays());
+        std::vector<HitRecord> expected, got;
+        for (std::uint32_t ray = 0; ray < hits.size(); ++ray) {
+          const std::optional<std::uint32_t> in_frame = ray_in_frame(view, some, ray);
+          if (!in_frame) continue;
+          expected.push_back(all[*in_frame]);
+          got.push_back(hits[ray]);
+        }
+        test::expect_same_hits(got, expected, some.ray_columns());
+        EXPECT_GT(test::num_hits(got), got.size() / 5);
+      }
+    }
+  }
+}
+
+TEST_P(RaySampleOnDevice, ChoicesAreTheSame) {
+  if (is_simulator(GetParam())) GTEST_SKIP() << "too many rays";
+  constexpr ImageSize kSize{240, 180};
+  for (const std::uint32_t rate : {8u, 20u}) {
+    const CompressedVolume volume =
+        levels_of_field({50, 60, 44}, test::gyroid_field(30), {.rate = rate});
+    ocl::Device device(GetParam());
+    DeviceRenderer on_device(device, volume, {.size = kSize, .with_levels = true});
+    HostRenderer on_host(volume);
+    TwinRenderer twin(volume, kSize);
+    Camera camera = orbit_cameras(volume.info, 1)[0];
+    camera.eye += 1.2 * (camera.eye - camera.at);
+    for (const double error : {0.02, 1.0, 4.0}) {
+      const FrameRequest request = request_by_sample(camera, kSize, 0.2f, error);
+      std::vector<FrameStats> stats;
+      std::vector<std::vector<float>> depths;
+      for (Renderer *renderer :
+           {static_cast<Renderer *>(&on_device), static_cast<Renderer *>(&on_host),
+            static_cast<Renderer *>(&twin)}) {
+        BoundedRenderer bounded(*renderer, volume, volume.rate());
+        stats.push_back(bounded.render(request));
+        depths.push_back(bounded.depth());
+      }
+      const DetailChoice &choice = stats.front().detail.value();
+      EXPECT_EQ(choice.detail.voxel_pixels > 0, error >= 1) << error;
+      if (rate < kMinPlaneRate) EXPECT_EQ(choice.detail.voxel_error, 0);
+      if (rate > kMinPlaneRate && error == 4) EXPECT_GT(choice.detail.voxel_error, 0);
+      for (std::size_t i = 1; i < stats.size(); ++i) {
+        const DetailChoice &other = stats[i].detail.value();
+        EXPECT_EQ(other.detail, choice.detail);
+        EXPECT_EQ(other.sample->num_hits, choice.sample->num_hits);
+        EXPECT_EQ(other.sample->num_within, choice.sample->num_within);
+        EXPECT_EQ(other.sample->lowest, choice.sample->lowest);
+        ASSERT_EQ(other.tries.size(), choice.tries.size());
+        for (std::size_t k = 0; k < choice.tries.size(); ++k)
+          EXPECT_EQ(other.tries[k].kept, choice.tries[k].kept);
+        EXPECT_EQ(depths[i], depths.front());
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace isowave::core
