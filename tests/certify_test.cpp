@@ -307,8 +307,7 @@ TEST_P(CertifyOnDevice, TakesNoLevelsThatSpareLittle) {
   const Camera camera = orbit_cameras(scene.volume.info, 1)[0];
   const DetailChoice choice = choose_detail(renderer, scene.volume, {camera, 0.3f}, 0.05);
   EXPECT_TRUE(std::ranges::any_of(choice.tries, [&](const DetailChoice::Try &each) {
-    return each.detail.voxel_pixels > 0.6 &&
-           each.kept >= choice.tries[0].kept - kLostShare;
+    return each.detail.voxel_pixels > 0.6 && each.kept >= choice.tries[0].kept - kLostShare;
   })) << "the error would allow them";
   EXPECT_EQ(choice.detail.voxel_pixels, 0);
   EXPECT_EQ(renderer.render(with_detail({camera, 0.3f}, choice.detail)).last_level, 0u);

@@ -388,25 +388,31 @@ TEST(CliRender, MaxError) {
 
 TEST(CliRender, MaxErrorBySample) {
   const TemporaryFolder folder;
-  const std::string volume = "generate:mixing_layer_48x48x48_uint8 -i 128 --size 200x150 ",
-                    error = "--max-surface-error 4 --by sample ";
-  const auto run = render(volume + "--orbit 1 --rate 8 --no-stage-times " + error + "--stats " +
-                          quoted(folder / "a.json"));
-  EXPECT_NE(run.out.find("% confidence (Clopper-Pearson)"), std::string::npos) << run.out;
-  const json said = json::parse(test::read_file(folder / "a.json"))["frames"][0]["error"];
-  EXPECT_EQ(said["by"], "sample");
-  EXPECT_GE(said["lowest_share"], 0.99);
-  EXPECT_EQ(said["confidence"], 0.95);
-  EXPECT_GE(said["sampled_hits"], said["within"]);
-  EXPECT_GT(said["sampled_rays"], said["sampled_hits"]);
-  EXPECT_GT(said["tries"].size(), 3u);
-  EXPECT_EQ(said["tries"][0]["within"], 1.0);
+  const std::string volume = "generate:shell_64x64x64_uint8 -i 128 --size 320x240 ";
+  const auto error_of = [&](const std::string &error) {
+    const auto run = render(volume + "--rate 8 --no-stage-times --by sample --stats " +
+                            quoted(folder / "a.json") + " --max-surface-error " + error);
+    EXPECT_EQ(run.out.find("% confidence (Clopper-Pearson)") != std::string::npos, error == "4");
+    EXPECT_EQ(run.out.find("  full detail: ") != std::string::npos, error != "4") << run.out;
+    return json::parse(test::read_file(folder / "a.json"))["frames"][0]["error"];
+  };
+  const json coarse = error_of("4");
+  EXPECT_EQ(coarse["by"], "sample");
+  EXPECT_GT(coarse["chosen"]["voxel_pixels"], 0);
+  EXPECT_GE(coarse["lowest_share"], 0.99);
+  EXPECT_EQ(coarse["confidence"], 0.95);
+  EXPECT_GE(coarse["sampled_hits"], coarse["within"]);
+  EXPECT_GT(coarse["sampled_rays"], coarse["sampled_hits"]);
+  EXPECT_GT(coarse["tries"].size(), 3u);
+  EXPECT_EQ(coarse["tries"][0]["within"], 1.0);
+  EXPECT_EQ(error_of("0.00001")["chosen"], json({{"voxel_pixels", 0.0}, {"voxel_error", 0.0}}));
 
-  const std::string command = "render " + volume + " -o " + quoted(folder / "b.png ");
+  const std::string command = "render " + volume + " -o " + quoted(folder / "b.png") + " ";
   test::expect_one_line_error(command + "--max-surface-error 1 --by nonsense", "--by");
   test::expect_one_line_error(command + "--by sample", "--by sample needs --max-surface-error");
-  test::expect_one_line_error(command + error + "--error-map " + quoted(folder / "e.npy"),
-                              "leave out --by sample");
+  test::expect_one_line_error(
+      command + "--max-surface-error 1 --by sample --error-map " + quoted(folder / "e.npy"),
+      "leave out --by sample");
 }
 
 TEST(CliRender, TimeBudget) {

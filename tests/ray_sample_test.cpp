@@ -30,7 +30,7 @@ using testing::ThrowsMessage;
 CompressedVolume levels_of_field(const glm::uvec3 &dims, const test::VoxelFunction &field,
                                  CompressOptions how = {.rate = 16}) {
   const std::vector<float> voxels = test::sample(dims, field);
-  test::ArrayReader reader(test::grid_info(dims), voxels);
+  ArrayReader reader(test::grid_info(dims), voxels);
   how.levels = 0;
   return compress(reader, how);
 }
@@ -73,7 +73,9 @@ TEST(RaySample, IsOfTheFramesOwnRays) {
         }
         const double expected = double(frame.num_rays()) / (stride * stride);
         EXPECT_NEAR(double(times.size()), expected, 3 * std::sqrt(expected) + 1);
-        if (stride == 1) EXPECT_EQ(times.size(), frame.num_rays());
+        if (stride == 1) {
+          EXPECT_EQ(times.size(), frame.num_rays());
+        }
       }
     }
   }
@@ -135,6 +137,19 @@ TEST(RaySample, LowestShareIsClopperPearsons) {
   EXPECT_FALSE(suffices({}));
 }
 
+/// If the share of all rays is just too small, a sample says otherwise in 5 % of cases at most.
+TEST(RaySample, IsRarelyWrong) {
+  for (const int hits : {299, 1000, 5000}) {
+    int within = hits;
+    const auto is_enough = [&](int number) {
+      return suffices({.num_hits = std::uint64_t(hits), .num_within = std::uint64_t(number)});
+    };
+    while (is_enough(within - 1)) --within;
+    EXPECT_LE(tail(hits, within, kSampledShare), 0.05);
+    EXPECT_GT(tail(hits, within - 1, kSampledShare), 0.05) << "and no stricter than that";
+  }
+}
+
 TEST(RaySample, HitsAreComparedAlongTheRay) {
   const Camera camera{.eye = {0, 0, 0}, .at = {0, 0, -1}, .fovy_deg = 90};
   const float no = INFINITY;  // a pixel at distance 100 is 2 units high
@@ -155,69 +170,74 @@ FrameRequest request_by_sample(const Camera &camera, ImageSize size, float isova
   return request;
 }
 
-/// A volume, a view and an error, by a seed.
-struct RandomScene {
-  explicit RandomScene(std::uint32_t seed) : random(seed) {
-    const glm::uvec3 dims(between(48, 72), between(48, 72), between(48, 72));
-    std::vector<std::array<glm::dvec3, 2>> waves(6);
-    for (auto &[direction, phase] : waves) {
-      direction =
-          glm::normalize(glm::dvec3(between(-1, 1), between(-1, 1), between(-1, 1)) + 0.01) *
-          (2 * M_PI / between(6, 60));
-      phase = glm::dvec3(between(0, 6));
-    }
-    const double noise = between(0, 0.2), offset = between(-1, 1);
-    const test::VoxelFunction rough = test::noise_field(seed);
-    volume = levels_of_field(dims, [&](const glm::dvec3 &at) {
-      double value = offset + noise * rough(at);
-      for (const auto &[direction, phase] : waves)
-        value += std::sin(glm::dot(direction, at) + phase.x);
-      return value;
-    });
-    camera = orbit_cameras(volume.info, 16)[static_cast<std::size_t>(between(0, 16))];
-    camera.eye = camera.at + between(0.8, 3) * (camera.eye - camera.at);
-    if (between(0, 1) < 0.2) camera = in_parallel(camera);
-    max_surface_error = std::exp2(between(-1, 2));
-  }
-  double between(double low, double high) {
-    return std::uniform_real_distribution(low, high)(random);
-  }
+/// Random numbers by a seed.
+struct Random {
+  double between(double low, double high) { return std::uniform_real_distribution(low, high)(of); }
 
-  std::mt19937 random;
-  CompressedVolume volume;
-  Camera camera;
-  double max_surface_error = 1;
+  std::mt19937 of;
 };
 
-/// In at least 95 of 100 scenes, 99 % of all rays keep the error that was judged by a sample. A
+/// Waves in random directions, with a little noise.
+CompressedVolume random_volume(Random &random) {
+  const auto side = [&] { return static_cast<std::uint32_t>(random.between(72, 108)); };
+  std::vector<std::pair<glm::dvec3, double>> waves(4);
+  for (auto &[direction, phase] : waves) {
+    const glm::dvec3 along(random.between(-1, 1), random.between(-1, 1), random.between(-1, 1));
+    direction = glm::normalize(along + 0.01) * (2 * M_PI / random.between(50, 250));
+    phase = random.between(0, 6);
+  }
+  const double noise = random.between(0, 0.02);
+  const test::VoxelFunction rough = test::noise_field(static_cast<std::uint32_t>(random.of()));
+  return levels_of_field({side(), side(), side()}, [&](const glm::dvec3 &at) {
+    double value = noise * rough(at);
+    for (const auto &[direction, phase] : waves) value += std::sin(glm::dot(direction, at) + phase);
+    return value;
+  });
+}
+
+/// A view of a volume, an isovalue and an error.
+FrameRequest random_request(const VolumeInfo &info, ImageSize size, Random &random) {
+  Camera camera = orbit_cameras(info, 16)[static_cast<std::size_t>(random.between(0, 16))];
+  camera.eye = camera.at + random.between(0.5, 1.4) * (camera.eye - camera.at);
+  if (random.between(0, 1) < 0.2) camera = in_parallel(camera);
+  return request_by_sample(camera, size, static_cast<float>(random.between(-1, 1)),
+                           std::exp2(random.between(-1, 3)));
+}
+
+/// In at least 95 of 100 scenes, 99 % of all hits keep the error that was judged by a sample. A
 /// judge that always says yes fails.
 TEST(RaySample, PromiseHoldsInRandomScenes) {
-  constexpr ImageSize kSize{240, 180};
+  constexpr ImageSize kSize{320, 240};
+  ASSERT_GT(sample_of(kSize).stride, 1u);
   int num_kept = 0, num_coarse = 0, num_kept_always = 0;
-  for (std::uint32_t seed = 0; seed < 100; ++seed) {
-    const RandomScene scene(seed);
-    HostRenderer renderer(scene.volume);
-    BoundedRenderer bounded(renderer, scene.volume, scene.volume.rate());
-    FrameRequest request = request_by_sample(scene.camera, kSize, 0.3f, scene.max_surface_error);
-    const DetailChoice choice = bounded.render(request).detail.value();
-    const std::vector<float> drawn = bounded.depth();
-    num_coarse += choice.detail.voxel_pixels > 0;
-    const FrameRequest finest{.camera = scene.camera, .isovalue = 0.3f, .size = kSize};
-    renderer.render(finest);
-    const std::vector<float> truth = renderer.depth();
-    const auto is_kept = [&](const std::vector<float> &depth) {
-      return compare_hits(scene.camera, kSize, truth, depth, scene.max_surface_error).share() >=
-             kSampledShare;
-    };
-    num_kept += is_kept(drawn);
-    renderer.render(with_detail(finest, {8, 0}));
-    num_kept_always += is_kept(renderer.depth());
+  Random random{std::mt19937(1)};
+  for (int volumes = 0; volumes < 10; ++volumes) {
+    const CompressedVolume volume = random_volume(random);
+    HostRenderer renderer(volume);
+    BoundedRenderer bounded(renderer, volume, volume.rate());
+    for (int views = 0; views < 10; ++views) {
+      FrameRequest request = random_request(volume.info, kSize, random);
+      const double limit = request.max_surface_error.value();
+      num_coarse += bounded.render(request).detail->detail.voxel_pixels > 0;
+      const std::vector<float> drawn = bounded.depth();
+      request.max_surface_error.reset();
+      request.by = Evidence::kProof;
+      renderer.render(request);
+      const std::vector<float> truth = renderer.depth();
+      const auto is_kept = [&](const std::vector<float> &depth) {
+        return compare_hits(request.camera, kSize, truth, depth, limit).share() >= kSampledShare;
+      };
+      num_kept += is_kept(drawn);
+      renderer.render(with_detail(request, {8, 0}));
+      num_kept_always += is_kept(renderer.depth());
+    }
   }
   EXPECT_GE(num_kept, 95);
-  EXPECT_GE(num_coarse, 30) << "most of them choose something";
-  EXPECT_LT(num_kept_always, 60) << "the coarsest is not the right choice for all";
+  EXPECT_GE(num_coarse, 30);
+  EXPECT_LT(num_kept_always, 95) << "a judge that always says yes";
   RecordProperty("kept", num_kept);
   RecordProperty("coarse", num_coarse);
+  RecordProperty("kept_always", num_kept_always);
 }
 
 TEST(RaySample, NeedsNoErrors) {
@@ -225,8 +245,8 @@ TEST(RaySample, NeedsNoErrors) {
   HostRenderer renderer(volume);
   BoundedRenderer bounded(renderer, volume, volume.rate());
   Camera camera = orbit_cameras(volume.info, 1)[0];
-  camera.eye += 1.5 * (camera.eye - camera.at);
-  FrameRequest request = request_by_sample(camera, {200, 150}, 0.3f, 1);
+  camera.eye -= 0.3 * (camera.eye - camera.at);
+  FrameRequest request = request_by_sample(camera, {320, 240}, 0.3f, 2);
   const DetailChoice choice = bounded.render(request).detail.value();
   EXPECT_GT(choice.detail.voxel_pixels, 0);
   ASSERT_TRUE(choice.sample);
@@ -304,7 +324,7 @@ TEST_P(RaySampleOnDevice, SmallSamplesHaveTheFramesHits) {
 
 TEST_P(RaySampleOnDevice, ChoicesAreTheSame) {
   if (is_simulator(GetParam())) GTEST_SKIP() << "too many rays";
-  constexpr ImageSize kSize{240, 180};
+  constexpr ImageSize kSize{320, 240};
   for (const std::uint32_t rate : {8u, 20u}) {
     const CompressedVolume volume =
         levels_of_field({50, 60, 44}, test::gyroid_field(30), {.rate = rate});
@@ -313,7 +333,7 @@ TEST_P(RaySampleOnDevice, ChoicesAreTheSame) {
     HostRenderer on_host(volume);
     TwinRenderer twin(volume, kSize);
     Camera camera = orbit_cameras(volume.info, 1)[0];
-    camera.eye += 1.2 * (camera.eye - camera.at);
+    camera.eye -= 0.3 * (camera.eye - camera.at);
     for (const double error : {0.02, 1.0, 4.0}) {
       const FrameRequest request = request_by_sample(camera, kSize, 0.2f, error);
       std::vector<FrameStats> stats;
@@ -327,8 +347,9 @@ TEST_P(RaySampleOnDevice, ChoicesAreTheSame) {
       }
       const DetailChoice &choice = stats.front().detail.value();
       EXPECT_EQ(choice.detail.voxel_pixels > 0, error >= 1) << error;
-      if (rate < kMinPlaneRate) EXPECT_EQ(choice.detail.voxel_error, 0);
-      if (rate > kMinPlaneRate && error == 4) EXPECT_GT(choice.detail.voxel_error, 0);
+      if (rate < kMinPlaneRate || error == 4) {
+        EXPECT_EQ(choice.detail.voxel_error > 0, rate > kMinPlaneRate);
+      }
       for (std::size_t i = 1; i < stats.size(); ++i) {
         const DetailChoice &other = stats[i].detail.value();
         EXPECT_EQ(other.detail, choice.detail);

@@ -55,14 +55,20 @@ nlohmann::ordered_json report_steps(const FrameStats &stats, double budget_ms) {
 
 nlohmann::ordered_json report_sample(double max_surface_error, const DetailChoice &choice) {
   const SampledShare &sample = choice.sample.value();
-  fmt::print(
-      "  within {} pixels of the surface at full detail: {:.2f} % of {} sampled hits of {} rays; "
-      "at "
-      "least {:.2f} % of all, with {:.0f} % confidence (Clopper-Pearson)\n"
-      "  with voxels up to {:.3g} pixels apart and values up to {} off; chosen in {:.0f} ms\n",
-      max_surface_error, 100 * sample.share(), with_commas(sample.num_hits),
-      with_commas(sample.num_rays), 100 * sample.lowest, 100 * kConfidence,
-      choice.detail.voxel_pixels, choice.detail.voxel_error, choice.total_ms);
+  if (choice.detail == Detail{}) {
+    fmt::print(
+        "  full detail: the sample does not show that less would keep {} pixels and save many "
+        "blocks; chosen in {:.0f} ms\n",
+        max_surface_error, choice.total_ms);
+  } else {
+    fmt::print(
+        "  within {} pixels of the surface at full detail: {:.2f} % of {} hits of {} sampled rays\n"
+        "  at least {:.2f} % of all hits, with {:.0f} % confidence (Clopper-Pearson)\n"
+        "  with voxels up to {:.3g} pixels apart and values up to {} off; chosen in {:.0f} ms\n",
+        max_surface_error, 100 * sample.share(), with_commas(sample.num_hits),
+        with_commas(sample.num_rays), 100 * sample.lowest, 100 * kConfidence,
+        choice.detail.voxel_pixels, choice.detail.voxel_error, choice.total_ms);
+  }
   return {{"max_surface_error", max_surface_error}, {"by", "sample"},
           {"chosen", detail_json(choice.detail)},   {"tries", tries_json(choice, "within")},
           {"choice_ms", choice.total_ms},           {"sampled_rays", sample.num_rays},
