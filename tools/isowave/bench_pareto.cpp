@@ -306,8 +306,7 @@ std::vector<Point> measure_ways(ocl::Device &device, const ParetoSubject &subjec
   for (const auto &[storage, of_storage] : by_storage) {
     CompressionOptions compression{.rate = storage.first, .relative_tolerance = storage.second};
     if (std::ranges::any_of(of_storage, &ParetoWay::needs_levels)) compression.levels = 0;
-    compression.measure_error = std::ranges::any_of(
-        of_storage, [](const ParetoWay *way) { return way->max_surface_error.has_value(); });
+    compression.measure_error = std::ranges::any_of(of_storage, &ParetoWay::needs_bounds);
     const CompressedVolume volume =
         load_volume(options.input, to_overrides(options.volume), compression, &device);
     for (const ParetoWay *way : of_storage) {

@@ -78,13 +78,12 @@ std::unique_ptr<Renderer> make_renderer(ocl::Device &device, const CompressedVol
     return std::make_unique<MeshRenderer>(device, volume, MeshRendererOptions{.size = size});
   RendererFlags flags{.pipeline = way.pipeline, .solver = way.solver, .values = {}};
   flags.values.with_levels = way.needs_levels() && !volume.coarser_levels.empty();
-  flags.values.with_bounds = way.max_surface_error.has_value();
+  flags.values.with_bounds = way.needs_bounds();
   flags.values.with_kept_picture = way.time_budget_ms.has_value();
   flags.values.with_given_rays = way.ambient_rays != 0;
   return add_choices(
       std::make_unique<DeviceRenderer>(device, volume, to_renderer_options(flags, size)),
-      {.with_bounds = flags.values.with_bounds, .with_time_budget = flags.values.with_kept_picture},
-      volume, volume.rate());
+      {.with_time_budget = flags.values.with_kept_picture}, volume, volume.rate());
 }
 
 FrameRequest request_of(const ParetoWay &way, ImageSize shown, float isovalue, double value_range) {
@@ -94,6 +93,7 @@ FrameRequest request_of(const ParetoWay &way, ImageSize shown, float isovalue, d
   request.voxel_pixels = way.voxel_pixels;
   request.voxel_error = way.voxel_error * value_range;
   request.max_surface_error = way.max_surface_error;
+  request.by = way.by;
   request.time_budget_ms = way.time_budget_ms;
   request.normals = way.normals;
   request.ambient_rays = way.ambient_rays;
