@@ -19,8 +19,8 @@ class Image:
     """A picture, and what it shows. Arrays that were not asked for are None.
 
     Rows go from top to bottom. If each pixel has several rays, depth, normals, position and bounds
-    have `samples` times as many rows and columns: one entry for each ray. With `adaptive`, they have
-    one entry for each pixel, of its first ray.
+    have `samples` times as many rows and columns: one entry for each ray. With `adaptive`, they are
+    those of each pixel's first ray.
     """
 
     rgb: npt.NDArray[np.uint8] | None  #: (height, width, 3)

@@ -217,8 +217,7 @@ class Renderer:
         color, background
             Colours of the surface and behind it: "#rrggbb", or red, green, blue from 0 to 1.
         normals
-            Normals that light the picture. "smooth": central differences; "cell": gradients of the
-            trilinear field itself, which jump from cell to cell.
+            "smooth": central differences; "cell": gradients of cells, which jump between them.
         outputs
             Names of the arrays to bring back: "rgb", "depth", "normals", "position", "bounds".
         max_error
@@ -237,8 +236,8 @@ class Renderer:
             Rays from each hit, up to 255, that find out how much of the sky it sees. 16 and more
             look smooth. Each takes about as long as a frame without any. Needs rays=True.
         adaptive
-            Casts one ray per pixel first, and those of `samples` only where neighbours differ, as
-            at silhouettes. Needs rays=True; not with ambient, voxel_pixels, max_error, time_budget.
+            Casts one ray per pixel, and those of `samples` only where neighbours differ. Not with
+            ambient, voxel_pixels, max_error, time_budget. Needs rays=True.
         on_pass
             Called after each pass with the picture so far. If it returns False, the frame stops.
 
