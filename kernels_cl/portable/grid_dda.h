@@ -31,7 +31,7 @@
 
 ISO_NAMESPACE_BEGIN
 
-#define ISO_AXIS_START 3  ///< axis of the event "the ray starts here"
+#define ISO_AXIS_START 3             ///< axis of the event "the ray starts here"
 #define ISO_SAMPLE_SEED 0x9e3779b9u  ///< of samples of rays, see place_of_ray()
 #define ISO_SMALLEST_DIRECTION \
   0x1p-40f  ///< smaller direction components count as 0: no denormals behind them

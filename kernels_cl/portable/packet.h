@@ -175,10 +175,9 @@ ISO_INLINE void make_packet_axes(const FrameParams *frame, Ints column, Ints row
       row[lane] = place.row;
     }
   }
-  const Floats u = to_floats(2 * column + 1 - (int)(view->stride * view->width)) *
-                   view->pixel_scale;
-  const Floats v = to_floats((int)(view->stride * view->height) - 1 - 2 * row) *
-                   view->pixel_scale;
+  const Floats u =
+      to_floats(2 * column + 1 - (int)(view->stride * view->width)) * view->pixel_scale;
+  const Floats v = to_floats((int)(view->stride * view->height) - 1 - 2 * row) * view->pixel_scale;
   const Floats length = sqrt(fma(u, u, fma(v, v, floats(1.0f))));
   make_packet_camera_axis(view, u, v, length, view->eye_x, view->fwd_x, view->right_x, view->up_x,
                           frame->brick.origin_x, &axes[0]);

@@ -246,26 +246,8 @@ class Renderer:
         Error
             A request that the renderer was not made for, in one line. Later frames can be drawn.
         """
-        return self.draw(
-            Request(
-                isovalue,
-                camera,
-                size,
-                samples,
-                color,
-                background,
-                normals,
-                outputs,
-                max_error,
-                by,
-                voxel_pixels,
-                voxel_error,
-                time_budget,
-                ambient,
-                adaptive,
-                on_pass,
-            )
-        )
+        arguments = {name: value for name, value in locals().items() if name != "self"}
+        return self.draw(Request(**arguments))
 
     def draw(self, request: Request) -> Image:
         """Draws a frame, as render()."""
