@@ -37,7 +37,7 @@ std::uint64_t count_edges(const std::vector<Triangle> &triangles) {
     }
   }
   std::ranges::sort(edges);
-  return static_cast<std::uint64_t>(std::ranges::unique(edges).begin() - edges.begin());
+  return static_cast<std::uint64_t>(std::unique(edges.begin(), edges.end()) - edges.begin());
 }
 
 /// Cells of a grid, each a number.

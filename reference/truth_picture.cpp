@@ -149,7 +149,7 @@ Image8 truth_picture(const GridOracle &oracle, const VolumeInfo &info, const Cam
       const glm::dvec3 mean = sum / (double(size.samples) * size.samples);
       for (int channel = 0; channel < 3; ++channel)
         image.pixels[3 * pixel + static_cast<std::size_t>(channel)] =
-            static_cast<std::uint8_t>(255 * mean[channel] + 0.5);
+            static_cast<std::uint8_t>(std::lround(255 * mean[channel]));
     }
   });
   return image;

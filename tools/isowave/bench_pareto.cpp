@@ -132,7 +132,7 @@ Image8 enlarged(const Image8 &image, ImageSize size) {
         const double above = std::lerp(value(x0, y0), value(x1, y0), x - double(x0)),
                      below = std::lerp(value(x0, y1), value(x1, y1), x - double(x0));
         result.pixels[3 * (std::size_t{row} * size.width + column) + channel] =
-            static_cast<std::uint8_t>(std::lerp(above, below, y - double(y0)) + 0.5);
+            static_cast<std::uint8_t>(std::lround(std::lerp(above, below, y - double(y0))));
       }
     }
   }

@@ -11,6 +11,7 @@ import subprocess
 from measuring.run import (
     CPU_VOLUMES,
     GPU_VOLUMES,
+    QUICK_VOLUMES,
     TOP,
     Failed,
     as_arguments,
@@ -242,8 +243,7 @@ def detail(run):
     return rows
 
 
-# Ways to draw the largest volume, each of which takes its time to store.
-WAYS_OF_THE_LARGEST = (
+WAYS_OF_LARGE_VOLUMES = (
     "default,--samples 2,--samples 4,--samples 8,1/2 size,1/4 size,1/8 size,"
     "--voxel-pixels 1,--voxel-pixels 2,"
     "--voxel-pixels 4,--voxel-pixels 1 --samples 2,--voxel-pixels 1 --samples 4,--time-budget 2,"
@@ -253,8 +253,8 @@ WAYS_OF_THE_LARGEST = (
 
 def drawn_by_others(run, volume, isovalue, options):
     """Draws a volume with the peers' programs that are there: names of JSON files for --peers."""
-    largest = "ways" in options  # floats of it would not fit
-    sides = "texture_uint8" if largest else "texture_uint8,nanovdb_float_ranges,nanovdb_fpn_ranges"
+    is_large = "ways" in options  # floats of the largest would not fit
+    sides = "texture_uint8" if is_large else "texture_uint8,nanovdb_float_ranges,nanovdb_fpn_ranges"
     program, chosen = "bench/gpu_peer", {"peers": sides}
     arguments = (volume,)
     if run.options.on_cpu:
@@ -279,37 +279,44 @@ def drawn_by_others(run, volume, isovalue, options):
     return {"peers": "peers/others.json"}
 
 
-def pareto(run):
-    """A row for each volume: what `isowave bench pareto` writes of it, and of peers."""
-    subjects = [(path, isovalues[0], {}) for path, isovalues in run.real_volumes("LIDC2")]
-    subjects += [(path, isovalues[1], {}) for path, isovalues in run.real_volumes("bonsai")]
-    options = {"size": "1280x720", "views": 3, "rounds": 3}
-    if run.options.quick:
-        options = {"size": "48x32", "views": 1, "rounds": 1}
-        options["ways"] = "default,--samples 2,1/2 size,--rate 2,--ambient 16,BCMC,--device host"
-    elif run.options.on_cpu:
-        options["size"] = "640x360"
-        subjects += [(f"generate:{field}_uint8", 128, {}) for field in CPU_VOLUMES]
-    else:
-        subjects += [(f"generate:{field}_uint8", 128, {}) for field in GPU_VOLUMES[:2]]
-        ways = {"ways": WAYS_OF_THE_LARGEST}
-        subjects.append((f"generate:{GPU_VOLUMES[3]}_uint8", 128, ways))
+def drawn_in_every_way(run, subjects, **options):
+    """Rows of (volume, isovalue): what `isowave bench pareto` writes of it, and of peers."""
     rows = []
-    for volume, isovalue, more in subjects:
-        more = {**options, **more}
+    for volume, isovalue in subjects:
         run.run(
             "isowave",
             "bench",
             "pareto",
             volume,
             isovalue=isovalue,
-            **more,
-            **drawn_by_others(run, volume, isovalue, more),
+            **options,
+            **drawn_by_others(run, volume, isovalue, options),
             device=run.options.device,
             json="o.json",
         )
         rows.append(what_was_measured(run.read_json("o.json")))
     return rows
+
+
+def pareto(run):
+    subjects = [(path, isovalues[0]) for path, isovalues in run.real_volumes("LIDC2")]
+    subjects += [(path, isovalues[1]) for path, isovalues in run.real_volumes("bonsai")]
+    if run.options.quick:
+        ways = "default,--samples 2,1/2 size,--rate 2,--ambient 16,BCMC,--device host"
+        return drawn_in_every_way(run, subjects, size="48x32", views=1, rounds=1, ways=ways)
+    fields = CPU_VOLUMES if run.options.on_cpu else GPU_VOLUMES[:1]
+    subjects += [(f"generate:{field}_uint8", 128) for field in fields]
+    size = "640x360" if run.options.on_cpu else "1280x720"
+    return drawn_in_every_way(run, subjects, size=size, views=3, rounds=3)
+
+
+def pareto_large(run):
+    """The same of larger volumes, in fewer ways: each takes its time to store."""
+    fields = QUICK_VOLUMES[:1] if run.options.quick else GPU_VOLUMES[1:4:2]
+    size = "48x32" if run.options.quick else "1280x720"
+    subjects = [(f"generate:{field}_uint8", 128) for field in fields]
+    ways = "default,BCMC" if run.options.quick else WAYS_OF_LARGE_VOLUMES
+    return drawn_in_every_way(run, subjects, size=size, views=2, rounds=3, ways=ways)
 
 
 def topology(run):

@@ -33,6 +33,7 @@ SECTIONS = {
         accuracy.detail,
         accuracy.solvers,
         accuracy.pareto,
+        accuracy.pareto_large,
         accuracy.topology,
     )
 }

@@ -416,6 +416,10 @@ def pareto(rows):
             )
 
 
+def pareto_large(rows):
+    yield from pareto(rows)
+
+
 def pareto_ways(rows):
     """Every way: ms of next frames and FLIP, a column for each volume."""
     yield "way to draw", *(f"{of_size(row)}: ms, FLIP" for row in rows)
@@ -457,6 +461,10 @@ def topology(rows):
             )
 
 
+def pareto_large_ways(rows):
+    yield from pareto_ways(rows)
+
+
 # Name of a table -> (section of the JSON, table).
 TABLES = {
     table.__name__: (section, table)
@@ -487,6 +495,7 @@ TABLES = {
         ("detail", detail),
         ("solvers", solvers, solver_frames),
         ("pareto", pareto, pareto_ways),
+        ("pareto_large", pareto_large, pareto_large_ways),
         ("topology", topology),
     )
     for table in tables
