@@ -3,20 +3,25 @@
 ///
 /// open_packets -> march_packets -> request_ahead -> [ cache -> decode -> open_packets ->
 /// march_packets -> request_ahead ]*. The first march makes the rays of the picture, in packets of
-/// 4 x 2; later ones take those that wait, eight neighbours of the list. One level of detail, rays
-/// of the camera, and solver `bernstein` alone: march has the others.
+/// 4 x 2; later ones take those that wait, eight neighbours of the list. Rays of the camera and
+/// solver `bernstein` alone: march has the others.
 ///
 /// ISO_ON_DEMAND, by -D: 1: rays decode the blocks that they come to (on_demand.h). So they wait
 /// only if there is no free slot, and a frame with enough slots takes one pass.
+///
+/// ISO_LEVELS, by -D, with ISO_ON_DEMAND: 1: the first pass of a frame that several levels of
+/// detail draw, in a launch for each band (packet_bands.h). Rays that wait then go on in march.
 #ifndef ISO_ON_DEMAND
 #define ISO_ON_DEMAND 0
 #endif
 #define ISO_FOUND local
 #include "device/float8.h"
+#include "device/level_band.h"
 #include "device/march_block.h"
 #include "device/march_pass.h"
 #include "device/on_demand.h"
 #include "device/opened_blocks.h"
+#include "portable/ray_state.h"
 
 #define ISO_LANES 8u
 // A work-item takes a chunk of packets at a time: a tile of the picture, wide enough that the hits
@@ -40,6 +45,10 @@ typedef struct PacketProgress {
 /// Blocks come from the cache.
 typedef struct PacketField {
   global const uint *macrocell_masks;
+  /* Of borders between levels: level_borders.h. */
+  global const uint *all_masks, *no_data;
+  global const ushort *ranges;
+  uint no_data_begin;
   CacheReader cache;
   OpenedBlock *opened; /* [ISO_OPENED_BLOCKS] */
   PacketProgress *progress;
@@ -150,6 +159,9 @@ ISO_INLINE Mask load_corners(const PacketField *field, const FrameParams *frame,
 }
 
 #include "portable/packet_walk.h"
+#if ISO_BANDS
+#include "device/packet_bands.h"
+#endif
 
 /// Opens a pass. One work-item.
 ///
@@ -310,12 +322,75 @@ ISO_INLINE uint count_chunks(const View *view, uint begins, uint num_rays) {
              : tiles_along(num_rays, ISO_LANES * ISO_LIST_PACKETS);
 }
 
+#if ISO_BANDS
+/// Walks the rays of a packet through the band of a level of detail. In the first band, they begin;
+/// in others, those go on that have left the one before.
+ISO_INLINE void march_band(Packet *p, const PacketScene *scene, int is_active_somewhere,
+                           PacketSource source, uint begins, BandRays *rays) {
+  const FrameParams *frame = scene->frame;
+  PacketProgress *progress = scene->field->progress;
+  const Ints ray_ids = source.ray_ids;
+  Ints states = ints((int)ISO_GOES_ON);
+  Mask lanes = source.lanes, kept = source.lanes;
+  if (begins == ISO_BEGINS_FRAME) {
+    lanes = on_screen(frame->screen, source);
+  } else {
+    states = read_states(ray_ids, source.lanes, rays->ray_block_ids);
+    lanes &= (states & ~7) == (int)ISO_GOES_ON;
+    kept = lanes;
+  }
+  if (any(lanes)) {
+    const Ints before = states & 3;
+    make_packet_axes(frame, source.column, source.row, p->rays.axis);
+    p->rays.begin_t = frame->band.begin_t;
+    p->rays.end_t = frame->band.end_t;
+    const Mask comes = lanes & (before != (int)ISO_SIDE_UNKNOWN);
+    if (any(comes)) {
+      const Ints sides = find_sides(scene, &p->rays, p->rays.begin_t, comes);
+      const Mask differs = comes & (sides != (int)ISO_SIDE_UNKNOWN) & (sides != before);
+      if (any(differs))
+        lanes &= ~differs | cross_border(scene, &p->rays, ray_ids, before, differs, rays);
+      kept &= ~differs | lanes;
+    }
+    if (is_active_somewhere && any(lanes)) {
+      const Mask enters = enter_box(&p->rays, scene) & lanes;
+      if (any(enters)) {
+        open_packet(p, scene);
+        begin_at_box(p, scene, enters);
+        walk_packet(p, scene);
+        if (any(p->found.lanes)) write_hits(p, scene, ray_ids, ISO_ROOT_STEPS, rays->hits);
+        if (any(p->waits))
+          list_waiting(p, frame, source, progress->moved, rays->num_waiting, rays->waiting,
+                       rays->ray_block_ids);
+        rays->num_hits += popcount(bits_of(p->found.lanes));
+        rays->num_met += popcount(bits_of(progress->met & ((states & (int)ISO_HAS_MET) == 0)));
+        lanes &= ~(p->found.lanes | p->waits);
+        kept &= ~p->waits;
+      }
+    }
+  }
+  if (frame->band.end_t == INFINITY) return;
+  Ints sides = ints(0);
+  if (any(lanes)) {
+    sides = find_sides(scene, &p->rays, p->rays.end_t, lanes);
+    Mask open = lanes & (sides == (int)ISO_SIDE_NOT_CERTAIN);
+    if (any(open)) {
+      sides = sides_of_each(scene, &p->rays, ray_ids, open, sides, rays);
+      kept &= ~(lanes & (sides == (int)ISO_SIDE_NOT_CERTAIN));
+    }
+  }
+  const Ints met = (states | (progress->met & (int)ISO_HAS_MET)) & (int)ISO_HAS_MET;
+  keep_states(lanes & ((int)ISO_GOES_ON | met | sides), ray_ids, kept, rays->ray_block_ids);
+}
+#endif
+
 /// Walks rays on until they hit, leave or wait: those of the picture, in the first pass of a frame,
 /// or those that wait.
 ///
-/// begins           1: the first pass of a frame
+/// begins           ISO_BEGINS_FRAME: the first pass of a frame; ISO_BEGINS_BAND: a further band
 /// part_0 .. layout the zfp stream (block_stream.h), as free_slots for decoding on demand alone
 /// macrocell_masks  as traverse
+/// ranges, no_data, no_data_begin  as start_rays, with ISO_LEVELS alone
 /// In      active_ray_ids [prev->next_active_count] and ray_block_ids [pixel] of the rays that
 ///         wait; begins: none
 /// Out     as march; begins: hits of all pixels, and counts->active_count, the rays that have met
@@ -326,6 +401,7 @@ kernel __attribute__((reqd_work_group_size(1, 1, 1))) void march_packets(
     const FrameParams frame_params, uint begins, global const uint *part_0,
     global const uint *part_1, global const uint *part_2, global const uint *part_3,
     global const uint *index, const StreamLayout layout, global const uint *macrocell_masks,
+    global const ushort *ranges, global const uint *no_data, uint no_data_begin,
     global BlockEntry *table, global ulong *inside, global SlotValue *cache_values,
     global const PassCounts *prev, global PassCounts *counts, global const uint *active_ray_ids,
     global uint *next_active_ray_ids, global uint *ray_block_ids, global HitRecord *hits,
@@ -356,7 +432,11 @@ kernel __attribute__((reqd_work_group_size(1, 1, 1))) void march_packets(
   };
   PacketProgress progress = {.num_blocks = 0};
   const PacketField field = {
-      .macrocell_masks = macrocell_masks,
+      .macrocell_masks = macrocell_masks + masks_begin(frame),
+      .all_masks = macrocell_masks,
+      .no_data = no_data,
+      .ranges = ranges,
+      .no_data_begin = no_data_begin,
       .cache = {.table = table,
                 .inside = inside,
                 .values = cache_values,
@@ -367,13 +447,21 @@ kernel __attribute__((reqd_work_group_size(1, 1, 1))) void march_packets(
       .progress = &progress,
       .maker = &maker,
   };
+#if ISO_BANDS
+  BandRays rays = {
+      .num_waiting = &counts->next_active_count,
+      .waiting = next_active_ray_ids,
+      .ray_block_ids = ray_block_ids,
+      .hits = hits,
+  };
+#endif
   uint num_met = 0, num_hits = 0;
   PacketScene scene;
   for (uint i = 0; i < ISO_OPENED_BLOCKS; ++i) opened[i].block_id = ISO_INVALID_ID;
   for (uint i = 0; i < ISO_BRICK_VOXELS; ++i) opened[0].voxels[i] = 0; /* read by idle lanes */
   const int is_active_somewhere = make_packet_scene(frame, &field, &scene);
   for (uint chunk = get_group_id(0); chunk < num_chunks; chunk += get_num_groups(0)) {
-    if (begins != 0) clear_hits(&frame->view, chunk, hits);
+    if (begins == ISO_BEGINS_FRAME) clear_hits(&frame->view, chunk, hits);
     for (uint packet = 0; packet < (begins != 0 ? ISO_TILE_PACKETS : ISO_LIST_PACKETS); ++packet) {
       const PacketSource source = begins != 0
                                       ? picture_packet(&frame->view, chunk, packet)
@@ -382,6 +470,9 @@ kernel __attribute__((reqd_work_group_size(1, 1, 1))) void march_packets(
       Packet p;
       progress.met = progress.moved = ints(0);
       p.waits = p.found.lanes = ints(0);
+#if ISO_BANDS
+      march_band(&p, &scene, is_active_somewhere, source, begins, &rays);
+#else
       if (is_active_somewhere) march_packet(&p, &scene, source, begins, ray_block_ids);
       if (any(p.found.lanes)) write_hits(&p, &scene, source.ray_ids, ISO_ROOT_STEPS, hits);
       if (any(p.waits)) {
@@ -390,8 +481,13 @@ kernel __attribute__((reqd_work_group_size(1, 1, 1))) void march_packets(
       }
       num_met += popcount(bits_of(progress.met));
       num_hits += popcount(bits_of(p.found.lanes));
+#endif
     }
   }
+#if ISO_BANDS
+  num_met = rays.num_met;
+  num_hits = rays.num_hits;
+#endif
   end_streams();
   if (num_hits != 0) atomic_add(&counts->hit_count, num_hits);
   if (maker.num_made != 0) {

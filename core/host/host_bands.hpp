@@ -140,7 +140,7 @@ inline void end_band(const HostLevel &level, RayPacket &packet) {
   for (uint left = packet.lanes; left != 0; left &= left - 1) {
     const auto lane = static_cast<uint>(std::countr_zero(left));
     packet.before[lane] = packet.sides.at_end[lane];
-    if (packet.before[lane] != kSideNotCertain) continue;
+    if (packet.before[lane] != ISO_SIDE_NOT_CERTAIN) continue;
     const Ray ray = make_ray(&level.frame, packet.ray_id(level.frame, lane));
     BlockCoords cell;
     packet.before[lane] = static_cast<uchar>(

@@ -14,10 +14,9 @@ namespace isowave::core {
 /// popcnt.
 uint trace_packets(const FrameParams &frame, const HostField &field, const RayTile &tile,
                    HitRecord *hits);
-constexpr uchar kSideNotCertain = 3;  ///< besides ISO_SIDE_*
 
-/// The sides of the surface on which eight rays are at the borders of a level's band, by the blocks
-/// that are on one side as a whole. kSideNotCertain: a cell must say, or float32 is not enough.
+/// The sides of the surface on which eight rays are at the borders of a level's band: find_sides()
+/// of kernels_cl/portable/packet_sides.h.
 struct BandSides {
   uchar at_begin[8], at_end[8];
 };

@@ -62,8 +62,41 @@ inline Mask load_corners(const PacketField *field, const FrameParams *frame, con
   return ints(0);
 }
 
+/// As packet_sides.h says.
+inline void sides_in_cells(const PacketField *field, const FrameParams *frame, const Ints *at,
+                           Mask lanes, Mask certain, Ints *sides) {
+  const Ints blocks[3] = {at[0] >> 2, at[1] >> 2, at[2] >> 2};
+  const auto block_of = [&](unsigned lane) {
+    return BlockCoords{static_cast<uint>(blocks[0][lane]), static_cast<uint>(blocks[1][lane]),
+                       static_cast<uint>(blocks[2][lane])};
+  };
+  Mask in_active = ints(0);
+  ISO_EACH_LANE(lane, lanes) {
+    const uint side = side_of_block(*frame, *field, block_of(lane));
+    if (side == ISO_SIDE_UNKNOWN) {
+      in_active[lane] = -1;
+    } else {
+      (*sides)[lane] = static_cast<int>(side);
+    }
+  }
+  in_active &= certain;
+  if (field->has_gaps || !any(in_active)) return;
+  Ints low = ints(0), high = ints(0);
+  open_blocks(field, frame, blocks, in_active, &low, &high);
+  const Ints numbers = (at[0] & 3) + 4 * (at[1] & 3) + 16 * (at[2] & 3),
+             changing = pick(numbers < 32, low, high) >> (numbers & 31) & 1;
+  ISO_EACH_LANE(lane, in_active & (changing == 0)) {
+    const BlockCoords b = block_of(lane);
+    const std::size_t block = level_block_at(frame, b.x, b.y, b.z);
+    const float voxel =
+        field->values[ISO_BLOCK_VOXELS * block + static_cast<std::size_t>(numbers[lane])];
+    (*sides)[lane] = voxel - frame->surface.isovalue >= 0.0f ? ISO_SIDE_INSIDE : ISO_SIDE_OUTSIDE;
+  }
+}
+
 }  // namespace isowave::core::ISO_PACKET_NAMESPACE
 
+#include "kernels_cl/portable/packet_sides.h"
 #include "kernels_cl/portable/packet_walk.h"
 
 namespace isowave::core::ISO_PACKET_NAMESPACE {
@@ -121,70 +154,8 @@ __attribute__((flatten)) inline uint trace_tile(const FrameParams &frame, const 
   return num_hits;
 }
 
-/// The cells in which rays are at t, as far as float32 knows.
-struct CellsAtBorder {
-  Mask within;                     ///< lanes that are in the domain then
-  Mask block_certain, is_certain;  ///< lanes for which that and the block are certain, and the cell
-  Ints at[3];
-};
-
-inline CellsAtBorder cells_at_border(const PacketScene &scene, const PacketRays &rays, float t) {
-  CellsAtBorder cells;
-  cells.within = cells.block_certain = cells.is_certain = ints(-1);
-  ISO_EACH_OF_3(axis) {
-    const PacketAxis *a = &rays.axis[axis];
-    const Floats position = fma(floats(t), a->d, a->o), at = in_brick(a, position),
-                 error = ISO_FLOAT_DOUBT * (fabs(position) + fabs(a->o)),
-                 last = floats(static_cast<float>(scene.last[axis]));
-    cells.within &= (at > 0.0f) & (at < last);
-    cells.block_certain &= (fabs(at - 4.0f * rint(0.25f * at)) > error) & (fabs(at - last) > error);
-    cells.is_certain &= fabs(at - rint(at)) > error;
-    const Floats not_below = larger(at, floats(0.0f)), within = smaller(not_below, last);
-    cells.at[axis] = to_ints(within);
-  }
-  cells.is_certain &= cells.block_certain;
-  return cells;
-}
-
-/// On which side of the surface rays are at t, by the blocks and cells that are on one side as a
-/// whole.
-inline void find_sides(const HostLevel &level, const PacketScene &scene, const PacketRays &rays,
-                       float t, Mask lanes, uchar *sides) {
-  const FrameParams &frame = level.frame;
-  const HostField &field = level.field;
-  const CellsAtBorder cells = cells_at_border(scene, rays, t);
-  const Mask is_outside = cells.block_certain & ~cells.within;
-  for (int lane = 0; lane < 8; ++lane)
-    sides[lane] = is_outside[lane] != 0 ? uchar{ISO_SIDE_UNKNOWN} : kSideNotCertain;
-  const auto block_of = [&](unsigned lane) {
-    return BlockCoords{static_cast<uint>(cells.at[0][lane] >> 2),
-                       static_cast<uint>(cells.at[1][lane] >> 2),
-                       static_cast<uint>(cells.at[2][lane] >> 2)};
-  };
-  const Mask in_blocks = lanes & cells.within & cells.block_certain;
-  Mask in_active = ints(0);
-  ISO_EACH_LANE(lane, in_blocks) {
-    const uint side = side_of_block(frame, field, block_of(lane));
-    if (side == ISO_SIDE_UNKNOWN) {
-      in_active[lane] = -1;
-    } else {
-      sides[lane] = static_cast<uchar>(side);
-    }
-  }
-  in_active &= cells.is_certain;
-  if (field.has_gaps || !any(in_active)) return;
-  const Ints blocks[3] = {cells.at[0] >> 2, cells.at[1] >> 2, cells.at[2] >> 2};
-  Ints low = ints(0), high = ints(0);
-  open_blocks(&field, &frame, blocks, in_active, &low, &high);
-  const Ints numbers = (cells.at[0] & 3) + 4 * (cells.at[1] & 3) + 16 * (cells.at[2] & 3),
-             changing = pick(numbers < 32, low, high) >> (numbers & 31) & 1;
-  ISO_EACH_LANE(lane, in_active & (changing == 0)) {
-    const BlockCoords b = block_of(lane);
-    const std::size_t block = level_block_at(&frame, b.x, b.y, b.z);
-    const float voxel =
-        field.values[ISO_BLOCK_VOXELS * block + static_cast<std::size_t>(numbers[lane])];
-    sides[lane] = voxel - frame.surface.isovalue >= 0.0f ? ISO_SIDE_INSIDE : ISO_SIDE_OUTSIDE;
-  }
+inline void keep_sides(Ints of_lanes, uchar *sides) {
+  for (int lane = 0; lane < 8; ++lane) sides[lane] = static_cast<uchar>(of_lanes[lane]);
 }
 
 /// As trace_band_packet().
@@ -198,11 +169,11 @@ __attribute__((flatten)) inline uint trace_band(const HostLevel &level, uint x, 
   PacketScene scene;
   const bool is_active = make_packet_scene(&frame, &level.field, &scene) != 0;
   if (frame.band.begin_t > 0)
-    find_sides(level, scene, p.rays, frame.band.begin_t, of, sides->at_begin);
+    keep_sides(find_sides(&scene, &p.rays, frame.band.begin_t, of), sides->at_begin);
   const Mask found = is_active ? trace_packet(scene, column, row, of, hits, &p) : ints(0);
   const Mask left = of & ~found;
   if (packet_band_ends(&p.rays) && any(left))
-    find_sides(level, scene, p.rays, frame.band.end_t, left, sides->at_end);
+    keep_sides(find_sides(&scene, &p.rays, frame.band.end_t, left), sides->at_end);
   return bits_of(found);
 }
 

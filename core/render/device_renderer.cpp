@@ -176,6 +176,8 @@ void DeviceRenderer::compile_kernels() {
   for (std::uint32_t num_levels = 1; num_levels <= std::min<std::size_t>(2, blocks_.levels.size());
        ++num_levels) {
     rays.num_level_frames = num_levels;
+    blocks_.drawing = {0, num_levels > 1 ? blocks_.levels.size() : 1};
+    for (Level &level : blocks_.levels) level.frame = rays.frame;
     std::vector<Wave *> waves{camera_rays_.get()};
     if (options_.with_shading) waves.push_back(&normals_of_camera_);
     if (ambient_round_) waves.push_back(&*ambient_round_);

@@ -1,5 +1,7 @@
 #include "core/render/ray_waves.hpp"
 
+#include <vector>
+
 namespace isowave::core {
 
 RaysWave::RaysWave(BlockStore &blocks, Wavefront &rays, std::uint32_t group_size, Solver solver,
@@ -19,6 +21,7 @@ RaysWave::RaysWave(BlockStore &blocks, Wavefront &rays, std::uint32_t group_size
   if (in_packets && MarchPackets::has(solver) && source == RaySource::kCamera) {
     march_packets_.emplace(blocks.device, rays.num_rays, solver,
                            decodes && !stream.window ? &stream : nullptr, blocks.cache.slot_type);
+    bands_in_packets_ = decodes && !stream.window && blocks.levels[0].info.brick == BrickOf{};
   }
 }
 
@@ -38,8 +41,13 @@ void RaysWave::enqueue_pass() {
   blocks_.provide(rays_);
   {
     const auto stage = timer.stage("march");
-    if (in_packets()) {
+    if (in_packets() && !draws_levels(rays_)) {
       (*march_packets_)(macrocells(), blocks_.levels[0].stream, blocks_.cache, rays_);
+    } else if (in_packets() && march_packets_->begins()) {
+      std::vector<MarchPackets::Band> bands;
+      for (std::size_t i = blocks_.drawing.first; i < blocks_.drawing.end; ++i)
+        bands.push_back({blocks_.levels[i].stream, blocks_.levels[i].frame});
+      (*march_packets_)(macrocells(), bands, blocks_.cache, rays_);
     } else {
       march_(macrocells(), blocks_.cache, rays_);
     }

@@ -4,7 +4,7 @@
 //   start_rays -> march -> request -> [ cache -> decode -> march -> request ]*
 //
 // On CPUs march_packets does the work of start_rays and march, and of cache and decode if there
-// are free slots.
+// are free slots. In frames of several levels of detail, it does so in the first pass.
 
 #include <cstdint>
 #include <optional>
@@ -44,14 +44,17 @@ class RaysWave : public Wave {
  private:
   void start(bool begins_frame);
   const Macrocells &macrocells() const { return blocks_.levels[0].macrocells; }
-  /// Whether the rays of the frame at work go in packets.
-  bool in_packets() const { return march_packets_ && !draws_levels(rays_); }
+  /// Whether the rays of the frame at work go in packets; those of several levels of detail in the
+  /// first pass alone.
+  bool in_packets() const { return march_packets_ && (bands_in_packets_ || !draws_levels(rays_)); }
 
   BlockStore &blocks_;
   Wavefront &rays_;
   StartRays start_rays_;
   March march_;
   std::optional<MarchPackets> march_packets_;  ///< instead of start_rays_ and march_
+  bool bands_in_packets_ = false;  ///< also in frames of several levels, since blocks are decoded
+                                   ///< on demand
   RequestAhead request_ahead_;
 };
 

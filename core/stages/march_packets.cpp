@@ -3,15 +3,21 @@
 #include <utility>
 
 #include "core/stages/solver_defines.hpp"
+#include "kernels_cl/portable/ray_state.h"
 
 namespace isowave::core {
 
 namespace {
 
 /// A work-item of its own for each packet: its lanes are what a work-group is elsewhere.
-ocl::Defines packet_defines(Solver solver, const DeviceStream *on_demand) {
+ocl::Defines packet_defines(Solver solver) {
   ocl::Defines defines = group_defines(1);
   defines.merge(solver_defines(solver));
+  return defines;
+}
+
+/// With the stream that rays decode blocks from, or none.
+ocl::Defines with_stream(ocl::Defines defines, const DeviceStream *on_demand) {
   if (on_demand != nullptr) {
     defines.merge(on_demand->defines());
     defines.emplace("ISO_ON_DEMAND", "1");
@@ -40,25 +46,57 @@ bool MarchPackets::may_decode(const ocl::DeviceInfo &device) {
 
 MarchPackets::MarchPackets(ocl::Device &device, std::uint64_t num_pixels, Solver solver,
                            const DeviceStream *on_demand, SlotType slots)
-    : on_demand_(on_demand != nullptr),
+    : device_(device),
+      defines_(with_slots(packet_defines(solver), slots)),
+      on_demand_(on_demand != nullptr),
       range_(range_of(device, num_pixels, on_demand_)),
-      open_(device, with_slots(packet_defines(solver, on_demand), slots)),
-      march_(device, with_slots(packet_defines(solver, on_demand), slots)) {}
+      open_(device, with_stream(defines_, on_demand)),
+      march_(device, with_stream(defines_, on_demand)) {}
 
-void MarchPackets::operator()(const Macrocells &macrocells, const DeviceStream &stream,
-                              BlockCache &cache, Wavefront &rays) {
-  const uint begins = std::exchange(begins_, false) ? 1 : 0;
+void MarchPackets::open(BlockCache &cache, Wavefront &rays, uint begins) {
+  open_({1, 1}, rays.frame, begins, rays.previous_counts, rays.counts, rays.next_counts,
+        cache.state);
+}
+
+void MarchPackets::march(ocl::Kernel<kernels::march_packets> &kernel, const FrameParams &frame,
+                         uint begins, const DeviceStream &stream, const Macrocells &macrocells,
+                         BlockCache &cache, Wavefront &rays) {
   const ocl::Buffer<uint> &none = macrocells.masks();  // stands in for what is not read
   const auto part = [&](std::size_t i) -> const ocl::Buffer<uint> & {
     return on_demand_ ? stream.part(i) : none;
   };
-  open_({1, 1}, rays.frame, begins, rays.previous_counts, rays.counts, rays.next_counts,
-        cache.state);
-  march_(range_, rays.frame, begins, part(0), part(1), part(2), part(3),
-         on_demand_ ? stream.index() : none, stream.layout, macrocells.masks(), cache.table,
-         cache.inside, cache.values, rays.previous_counts, rays.counts, rays.active_ray_ids,
+  kernel(range_, frame, begins, part(0), part(1), part(2), part(3),
+         on_demand_ ? stream.index() : none, stream.layout, macrocells.masks(), macrocells.ranges(),
+         macrocells.no_data().words_or(none), macrocells.no_data().begin, cache.table, cache.inside,
+         cache.values, rays.previous_counts, rays.counts, rays.active_ray_ids,
          rays.next_active_ray_ids, rays.ray_block_ids, rays.hits, cache.slot_block_ids,
          cache.slot_stamps, cache.requested_bits, cache.free_slots, cache.state);
+}
+
+void MarchPackets::operator()(const Macrocells &macrocells, const DeviceStream &stream,
+                              BlockCache &cache, Wavefront &rays) {
+  const uint begins = std::exchange(begins_, false) ? ISO_BEGINS_FRAME : 0;
+  open(cache, rays, begins);
+  march(march_, rays.frame, begins, stream, macrocells, cache, rays);
+}
+
+void MarchPackets::operator()(const Macrocells &macrocells, std::span<const Band> bands,
+                              BlockCache &cache, Wavefront &rays) {
+  begins_ = false;
+  uint begins = ISO_BEGINS_FRAME;
+  open(cache, rays, begins);
+  for (const Band &band : bands) {
+    ocl::Defines defines = band.stream.defines();
+    const auto found = march_bands_.find(defines);
+    auto &kernel = found != march_bands_.end()
+                       ? found->second
+                       : march_bands_
+                             .try_emplace(std::move(defines), device_,
+                                          with_levels(with_stream(defines_, &band.stream), true))
+                             .first->second;
+    march(kernel, band.frame, std::exchange(begins, ISO_BEGINS_BAND), band.stream, macrocells,
+          cache, rays);
+  }
 }
 
 }  // namespace isowave::core

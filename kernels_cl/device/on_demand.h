@@ -75,7 +75,7 @@ ISO_INLINE void make_block(BlockMaker *maker, const FrameParams *frame, BlockCoo
     return;
   }
   decode_block(maker->part_0, maker->part_1, maker->part_2, maker->part_3, maker->index,
-               maker->layout, block_id, 0, values);
+               maker->layout, level_block_at(frame, b.x, b.y, b.z), 0, values);
   for (v = 0; v < ISO_BLOCK_VOXELS; ++v) {
     maker->values[slot * ISO_BLOCK_VOXELS + v] = (SlotValue)values[v];
     inside |= (ulong)(values[v] - maker->isovalue >= 0.0f) << v;

@@ -27,6 +27,11 @@ ISO_NAMESPACE_BEGIN
 #define ISO_SIDE_UNKNOWN 0u
 #define ISO_SIDE_OUTSIDE 1u
 #define ISO_SIDE_INSIDE 2u
+#define ISO_SIDE_NOT_CERTAIN 3u  ///< besides: it has not been found out
+
+// What a launch of march_packets begins with, if not with a list of rays.
+#define ISO_BEGINS_FRAME 1u  ///< with the rays of the picture
+#define ISO_BEGINS_BAND 2u   ///< with those that go on to the next band of their frame
 
 /// A ray at work.
 typedef struct RayEntry {

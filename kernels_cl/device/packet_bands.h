@@ -1,0 +1,184 @@
+/// packet_bands.h -- eight rays at a time through the band of one level of detail, and over its
+/// borders (march_packets.cl). OpenCL C 1.2. As core/host/host_bands.hpp.
+///
+/// The first pass of a frame has a launch for each band. Between two launches, ray_block_ids has of
+/// each ray that goes on ISO_GOES_ON, with the side on which it left its band, and ISO_HAS_MET; of
+/// one that waits, its stand; of others, anything else.
+#ifndef ISOWAVE_PACKET_BANDS_H
+#define ISOWAVE_PACKET_BANDS_H
+
+#include "level_borders.h"
+#include "portable/packet_walk.h"
+
+#define ISO_GOES_ON 0xC0000000u /* no stand has side 3 */
+#define ISO_HAS_MET 4u          ///< it has come to an active block
+
+/// Where the rays of a launch go.
+typedef struct BandRays {
+  volatile global uint *num_waiting;
+  global uint *waiting, *ray_block_ids;
+  global HitRecord *hits;
+  uint num_met, num_hits;  ///< rays that have come to their first active block; that hit
+} BandRays;
+
+/// Which of the voxels of cached block b are inside.
+ISO_INLINE ulong inside_of(const CacheReader *cache, const FrameParams *frame, BlockCoords b) {
+  volatile global const BlockEntry *entries = cache->table;
+  return cache->inside[entries[find_entry(frame, cache->table, b.x, b.y, b.z)].slot];
+}
+
+/// Lanes at `bits`, low and high half, of their numbers, 0 to 63.
+ISO_INLINE Mask has_bit(uint low, uint high, Ints numbers) {
+  return -((pick(numbers < 32, ints((int)low), ints((int)high)) >> (numbers & 31)) & 1);
+}
+
+/// As packet_sides.h says.
+ISO_INLINE void sides_in_cells(const PacketField *field, const FrameParams *frame, const Ints *at,
+                               Mask lanes, Mask certain, Ints *sides) {
+  const Ints numbers = (at[0] & 3) + 4 * (at[1] & 3) + 16 * (at[2] & 3), x = at[0] >> 2,
+             y = at[1] >> 2, z = at[2] >> 2;
+  Mask left = lanes;
+  if (ISO_NO_DATA && field->no_data_begin != ISO_INVALID_ID) return;
+  while (any(left)) {
+    const uint first = first_lane(bits_of(left));
+    const Mask here = left & (x == x[first]) & (y == y[first]) & (z == z[first]);
+    const BlockCoords b = {(uint)x[first], (uint)y[first], (uint)z[first]};
+    const uint side = side_of_block(frame, field->all_masks, field->ranges, b);
+    left &= ~here;
+    if (side != ISO_SIDE_UNKNOWN) {
+      *sides = pick(here, ints((int)side), *sides);
+    } else if (any(here & certain)) {
+      const OpenedBlock *opened = find_opened(field, frame, b, 0);
+      if ((opened->have & ISO_OPENED_CACHED) != 0) {
+        const ulong inside = inside_of(&field->cache, frame, b);
+        const Mask known =
+            here & certain & ~has_bit(opened->cells_low, opened->cells_high, numbers);
+        *sides = pick(known,
+                      pick(has_bit((uint)inside, (uint)(inside >> 32), numbers),
+                           ints((int)ISO_SIDE_INSIDE), ints((int)ISO_SIDE_OUTSIDE)),
+                      *sides);
+      }
+    }
+  }
+}
+
+#include "portable/packet_sides.h"
+
+/// The corners of a cell minus the isovalue. Returns 0 if a block is missing.
+ISO_INLINE int open_cell(const PacketField *field, const FrameParams *frame, BlockCoords cell,
+                         float *w) {
+  const BlockCoords b = {cell.x >> 2, cell.y >> 2, cell.z >> 2};
+  const int x = (int)(cell.x & 3), y = (int)(cell.y & 3), z = (int)(cell.z & 3);
+  const uint corners = cell_blocks(x, y, z);
+  const OpenedBlock *opened = find_opened(field, frame, b, corners);
+  if ((corners & ~opened->have) != 0) return 0;
+  vstore8(cell_corners(opened->voxels + x + 5 * y + 25 * z) - frame->surface.isovalue, 0, w);
+  return 1;
+}
+
+/// The side on which a ray is at the border at t, which is in *cell; unknown if it does not come to
+/// the border, or is in a cell without data there; ISO_SIDE_NOT_CERTAIN if a block is missing.
+ISO_SELDOM uint side_at_border(const PacketField *field, const FrameParams *frame, const Ray *ray,
+                               float t, BlockCoords *cell) {
+  const LastPlanes last = last_planes(frame);
+  float w[8];
+  if (!reaches_border(ray, last, t)) return ISO_SIDE_UNKNOWN;
+  *cell = region_at_border(ray, last, t, 1);
+  const BlockCoords b = {cell->x >> 2, cell->y >> 2, cell->z >> 2};
+  if (lacks_data_at_border(frame, field->no_data, field->no_data_begin, ray, t))
+    return ISO_SIDE_UNKNOWN;
+  const uint side = side_of_block(frame, field->all_masks, field->ranges, b);
+  if (side != ISO_SIDE_UNKNOWN) return side;
+  if (!open_cell(field, frame, *cell, w)) return ISO_SIDE_NOT_CERTAIN;
+  return inside_at(ray, w, border_event(t), (int)cell->x, (int)cell->y, (int)cell->z, 0)
+             ? ISO_SIDE_INSIDE
+             : ISO_SIDE_OUTSIDE;
+}
+
+/// The hit of a ray at the border at which its band begins, in that cell. Returns 0 if a block is
+/// missing.
+ISO_SELDOM int hit_at_border(const PacketField *field, const FrameParams *frame, const Ray *ray,
+                             BlockCoords cell, global HitRecord *hit) {
+  const int x = (int)cell.x, y = (int)cell.y, z = (int)cell.z;
+  const GridWalk walk = walk_from(ray, x, y, z, 1, last_planes(frame));
+  float w[8];
+  if (!open_cell(field, frame, cell, w)) return 0;
+  *hit = make_hit(frame, ray, w, x, y, z, band_begin(frame),
+                  band_exit(frame, walk_exit(&walk, ray)), 0.0f);
+  return 1;
+}
+
+/// Lists a ray that waits at a block of a cell, with its side.
+ISO_INLINE void wait_in_cell(const FrameParams *frame, BlockCoords cell, uint side, uint log_ahead,
+                             uint pixel, const BandRays *rays) {
+  rays->ray_block_ids[pixel] =
+      pack_stand(block_id_at(frame, cell.x >> 2, cell.y >> 2, cell.z >> 2), side);
+  rays->waiting[atomic_inc(rays->num_waiting)] = pack_entry(pixel, log_ahead, 0);
+}
+
+/// Lanes that may hit at the border at which their band begins, since they were on another side
+/// before, do so, or wait for a block there. Returns those that go on.
+ISO_SELDOM Mask cross_border(const PacketScene *scene, const PacketRays *r, Ints ray_ids,
+                             Ints before, Mask lanes, BandRays *rays) {
+  const FrameParams *frame = scene->frame;
+  Mask on = ints(0);
+  ISO_EACH_LANE(lane, lanes) {
+    const Ray ray = ray_of_lane(r, (int)lane);
+    const uint pixel = (uint)ray_ids[lane], from = (uint)before[lane];
+    BlockCoords cell = {0, 0, 0};
+    const uint side = side_at_border(scene->field, frame, &ray, r->begin_t, &cell);
+    if (side == ISO_SIDE_UNKNOWN || side == from) {
+      on[lane] = -1;
+    } else if (side != ISO_SIDE_NOT_CERTAIN &&
+               hit_at_border(scene->field, frame, &ray, cell, &rays->hits[pixel])) {
+      ++rays->num_hits;
+      rays->ray_block_ids[pixel] = 0;
+    } else {
+      wait_in_cell(frame, cell, from, ISO_BORDER_LOG_AHEAD, pixel, rays);
+    }
+  }
+  return on;
+}
+
+/// The sides of lanes at the end of their band. Those that miss a block there wait, and go through
+/// it again: ISO_SIDE_NOT_CERTAIN.
+ISO_SELDOM Ints sides_of_each(const PacketScene *scene, const PacketRays *r, Ints ray_ids,
+                              Mask lanes, Ints sides, const BandRays *rays) {
+  Ints found = sides;
+  ISO_EACH_LANE(lane, lanes) {
+    const Ray ray = ray_of_lane(r, (int)lane);
+    BlockCoords cell = {0, 0, 0};
+    found[lane] = (int)side_at_border(scene->field, scene->frame, &ray, r->end_t, &cell);
+    if (found[lane] == (int)ISO_SIDE_NOT_CERTAIN)
+      wait_in_cell(scene->frame, cell, ISO_SIDE_UNKNOWN, ISO_FIRST_LOG_AHEAD, (uint)ray_ids[lane],
+                   rays);
+  }
+  return found;
+}
+
+// ---- What a ray keeps between launches
+
+/// The rays of a packet lie in two rows of four.
+ISO_INLINE Ints read_states(Ints ray_ids, Mask lanes, global const uint *ray_block_ids) {
+  Ints states = ints(0);
+  if (bits_of(lanes) == 0xFFu) {
+    const int4 upper = as_int4(vload4(0, ray_block_ids + ray_ids.s0)),
+               lower = as_int4(vload4(0, ray_block_ids + ray_ids.s4));
+    return (int8)(upper.x, upper.y, upper.z, upper.w, lower.x, lower.y, lower.z, lower.w);
+  }
+  ISO_EACH_LANE(lane, lanes) states[lane] = (int)ray_block_ids[ray_ids[lane]];
+  return states;
+}
+
+ISO_INLINE void keep_states(Ints states, Ints ray_ids, Mask lanes, global uint *ray_block_ids) {
+  if (bits_of(lanes) == 0xFFu) {
+    vstore4((uint4)((uint)states.s0, (uint)states.s1, (uint)states.s2, (uint)states.s3), 0,
+            ray_block_ids + ray_ids.s0);
+    vstore4((uint4)((uint)states.s4, (uint)states.s5, (uint)states.s6, (uint)states.s7), 0,
+            ray_block_ids + ray_ids.s4);
+  } else {
+    ISO_EACH_LANE(lane, lanes) ray_block_ids[ray_ids[lane]] = (uint)states[lane];
+  }
+}
+
+#endif
