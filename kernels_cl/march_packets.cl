@@ -346,7 +346,7 @@ ISO_INLINE void march_band(Packet *p, const PacketScene *scene, int is_active_so
     p->rays.end_t = frame->band.end_t;
     const Mask comes = lanes & (before != (int)ISO_SIDE_UNKNOWN);
     if (any(comes)) {
-      const Ints sides = find_sides(scene, &p->rays, p->rays.begin_t, comes);
+      const Ints sides = sides_at(scene, &p->rays, p->rays.begin_t, comes);
       const Mask differs = comes & (sides != (int)ISO_SIDE_UNKNOWN) & (sides != before);
       if (any(differs))
         lanes &= ~differs | cross_border(scene, &p->rays, ray_ids, before, differs, rays);
@@ -372,7 +372,7 @@ ISO_INLINE void march_band(Packet *p, const PacketScene *scene, int is_active_so
   if (frame->band.end_t == INFINITY) return;
   Ints sides = ints(0);
   if (any(lanes)) {
-    sides = find_sides(scene, &p->rays, p->rays.end_t, lanes);
+    sides = sides_at(scene, &p->rays, p->rays.end_t, lanes);
     Mask open = lanes & (sides == (int)ISO_SIDE_NOT_CERTAIN);
     if (any(open)) {
       sides = sides_of_each(scene, &p->rays, ray_ids, open, sides, rays);

@@ -64,6 +64,11 @@ ISO_INLINE void sides_in_cells(const PacketField *field, const FrameParams *fram
 
 #include "portable/packet_sides.h"
 
+/// find_sides(), which must not burden those that walk.
+ISO_SELDOM Ints sides_at(const PacketScene *scene, const PacketRays *r, float t, Mask lanes) {
+  return find_sides(scene, r, t, lanes);
+}
+
 /// The corners of a cell minus the isovalue. Returns 0 if a block is missing.
 ISO_INLINE int open_cell(const PacketField *field, const FrameParams *frame, BlockCoords cell,
                          float *w) {

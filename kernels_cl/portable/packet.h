@@ -227,12 +227,16 @@ ISO_INLINE Floats of_axis(Ints axis, Floats x, Floats y, Floats z) {
   return pick(axis == 0, x, pick(axis == 1, y, z));
 }
 
+/// When rays cross those planes, in float32.
+ISO_INLINE Floats crossing_float_t(const PacketRays *r, Crossings c) {
+  const Floats from = of_axis(c.axis, r->axis[0].from, r->axis[1].from, r->axis[2].from),
+               rate = of_axis(c.axis, r->axis[0].rate, r->axis[1].rate, r->axis[2].rate);
+  return pick(c.axis == ISO_AXIS_START, floats(packet_begin_t(r)), (c.plane - from) * rate);
+}
+
 /// The moments at which rays entered their regions, in float32.
 ISO_INLINE Floats entry_t(const PacketRays *r) {
-  const Ints axis = r->entered.axis;
-  const Floats from = of_axis(axis, r->axis[0].from, r->axis[1].from, r->axis[2].from),
-               rate = of_axis(axis, r->axis[0].rate, r->axis[1].rate, r->axis[2].rate);
-  return pick(axis == ISO_AXIS_START, floats(packet_begin_t(r)), (r->entered.plane - from) * rate);
+  return crossing_float_t(r, r->entered);
 }
 
 /// When they cross those planes, in two-float.

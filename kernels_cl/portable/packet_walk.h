@@ -269,6 +269,11 @@ ISO_INLINE Mask load_cells(const Packet *p, const PacketScene *scene, const Floa
   return load_corners(scene->field, scene->frame, at, lanes, w);
 }
 
+/// Crossings that may be behind the end of the rays' band, by float32.
+ISO_INLINE Mask may_pass_end(const PacketRays *r, Crossings c) {
+  return crossing_float_t(r, c) >= r->end_t - 2.0f * ISO_FLOAT_DOUBT * r->end_t;
+}
+
 /// passes_border() at the end of the rays' band.
 ISO_INLINE Mask passes_end(const PacketRays *r, Crossings c) {
   const TwoFloats t = crossing_t(r, c);
@@ -288,7 +293,7 @@ ISO_INLINE void test_cells(Packet *p, const PacketScene *scene, Mask standing) {
   Crossings exit;
   exit.axis = pick(exits.on[0], ints(0), pick(exits.on[1], ints(1), ints(2)));
   exit.plane = pick(exits.on[0], far[0], pick(exits.on[1], far[1], far[2]));
-  if (packet_band_ends(&p->rays)) {
+  if (packet_band_ends(&p->rays) && any(lanes & may_pass_end(&p->rays, exit))) {
     lanes &= ~passes_end(&p->rays, p->rays.entered);
     ends = lanes & passes_end(&p->rays, exit);
     exit.axis = pick(ends, ints(ISO_AXIS_END), exit.axis);
