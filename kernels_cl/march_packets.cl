@@ -45,7 +45,7 @@ typedef struct PacketProgress {
 /// Blocks come from the cache.
 typedef struct PacketField {
   global const uint *macrocell_masks;
-  /* Of borders between levels: level_borders.h. */
+  /* What borders between levels need: level_borders.h. */
   global const uint *all_masks, *no_data;
   global const ushort *ranges;
   uint no_data_begin;
@@ -159,6 +159,14 @@ ISO_INLINE Mask load_corners(const PacketField *field, const FrameParams *frame,
 }
 
 #include "portable/packet_walk.h"
+/// Where the rays of a launch go.
+typedef struct LaunchRays {
+  volatile global uint *num_waiting;
+  global uint *waiting, *ray_block_ids;
+  global HitRecord *hits;
+  uint num_met, num_hits;  ///< rays that have come to their first active block; that hit
+} LaunchRays;
+
 #if ISO_BANDS
 #include "device/packet_bands.h"
 #endif
@@ -325,8 +333,8 @@ ISO_INLINE uint count_chunks(const View *view, uint begins, uint num_rays) {
 #if ISO_BANDS
 /// Walks the rays of a packet through the band of a level of detail. In the first band, they begin;
 /// in others, those go on that have left the one before.
-ISO_INLINE void march_band(Packet *p, const PacketScene *scene, int is_active_somewhere,
-                           PacketSource source, uint begins, BandRays *rays) {
+ISO_INLINE void draw_packet(Packet *p, const PacketScene *scene, int is_active_somewhere,
+                            PacketSource source, uint begins, LaunchRays *rays) {
   const FrameParams *frame = scene->frame;
   PacketProgress *progress = scene->field->progress;
   const Ints ray_ids = source.ray_ids;
@@ -381,6 +389,19 @@ ISO_INLINE void march_band(Packet *p, const PacketScene *scene, int is_active_so
   }
   const Ints met = (states | (progress->met & (int)ISO_HAS_MET)) & (int)ISO_HAS_MET;
   keep_states(lanes & ((int)ISO_GOES_ON | met | sides), ray_ids, kept, rays->ray_block_ids);
+}
+#else
+/// Walks the rays of a packet on, and stores their hits, or where they wait.
+ISO_INLINE void draw_packet(Packet *p, const PacketScene *scene, int is_active_somewhere,
+                            PacketSource source, uint begins, LaunchRays *rays) {
+  const PacketProgress *progress = scene->field->progress;
+  if (is_active_somewhere) march_packet(p, scene, source, begins, rays->ray_block_ids);
+  if (any(p->found.lanes)) write_hits(p, scene, source.ray_ids, ISO_ROOT_STEPS, rays->hits);
+  if (any(p->waits))
+    list_waiting(p, scene->frame, source, progress->moved, rays->num_waiting, rays->waiting,
+                 rays->ray_block_ids);
+  rays->num_met += popcount(bits_of(progress->met));
+  rays->num_hits += popcount(bits_of(p->found.lanes));
 }
 #endif
 
@@ -447,15 +468,12 @@ kernel __attribute__((reqd_work_group_size(1, 1, 1))) void march_packets(
       .progress = &progress,
       .maker = &maker,
   };
-#if ISO_BANDS
-  BandRays rays = {
+  LaunchRays rays = {
       .num_waiting = &counts->next_active_count,
       .waiting = next_active_ray_ids,
       .ray_block_ids = ray_block_ids,
       .hits = hits,
   };
-#endif
-  uint num_met = 0, num_hits = 0;
   PacketScene scene;
   for (uint i = 0; i < ISO_OPENED_BLOCKS; ++i) opened[i].block_id = ISO_INVALID_ID;
   for (uint i = 0; i < ISO_BRICK_VOXELS; ++i) opened[0].voxels[i] = 0; /* read by idle lanes */
@@ -470,30 +488,15 @@ kernel __attribute__((reqd_work_group_size(1, 1, 1))) void march_packets(
       Packet p;
       progress.met = progress.moved = ints(0);
       p.waits = p.found.lanes = ints(0);
-#if ISO_BANDS
-      march_band(&p, &scene, is_active_somewhere, source, begins, &rays);
-#else
-      if (is_active_somewhere) march_packet(&p, &scene, source, begins, ray_block_ids);
-      if (any(p.found.lanes)) write_hits(&p, &scene, source.ray_ids, ISO_ROOT_STEPS, hits);
-      if (any(p.waits)) {
-        list_waiting(&p, frame, source, progress.moved, &counts->next_active_count,
-                     next_active_ray_ids, ray_block_ids);
-      }
-      num_met += popcount(bits_of(progress.met));
-      num_hits += popcount(bits_of(p.found.lanes));
-#endif
+      draw_packet(&p, &scene, is_active_somewhere, source, begins, &rays);
     }
   }
-#if ISO_BANDS
-  num_met = rays.num_met;
-  num_hits = rays.num_hits;
-#endif
   end_streams();
-  if (num_hits != 0) atomic_add(&counts->hit_count, num_hits);
+  if (rays.num_hits != 0) atomic_add(&counts->hit_count, rays.num_hits);
   if (maker.num_made != 0) {
     atomic_add(&counts->decoded_count, maker.num_made);
     atomic_sub(&counts->free_count, maker.num_made);
   }
   if (progress.num_blocks != 0) atomic_add(&counts->granted_count, progress.num_blocks);
-  if (begins != 0 && num_met != 0) atomic_add(&counts->active_count, num_met);
+  if (begins != 0 && rays.num_met != 0) atomic_add(&counts->active_count, rays.num_met);
 }

@@ -409,7 +409,7 @@ TEST_P(LevelsOnDevice, FourRaysAPixelOfACoarseLevelBeatOneOfTheFinest) {
     std::uint64_t decoded = 0;
   };
   const auto draw = [&](ImageSize size, double voxel_pixels) {
-    // Several levels are never decoded on demand, which would decode fewer blocks of one.
+    // Not on demand, as on most devices.
     DeviceRenderer renderer(device_, volume,
                             {.size = size, .on_demand = DecodeOnDemand::kOff, .with_levels = true});
     Picture picture;

@@ -211,7 +211,8 @@ Abilities DeviceRenderer::abilities_of(const RendererOptions &options) {
 
 Abilities DeviceRenderer::abilities() const {
   Abilities abilities = abilities_of(options_);
-  // Frames of several levels are not drawn in packets, which a CPU needs.
+  // A CPU draws several levels about as fast as the finest alone (bench/detail.md): no reason for a
+  // coarser picture.
   abilities.levels_pay = abilities.levels && !MarchPackets::suits(device_.info());
   return abilities;
 }

@@ -13,14 +13,6 @@
 #define ISO_GOES_ON 0xC0000000u /* no stand has side 3 */
 #define ISO_HAS_MET 4u          ///< it has come to an active block
 
-/// Where the rays of a launch go.
-typedef struct BandRays {
-  volatile global uint *num_waiting;
-  global uint *waiting, *ray_block_ids;
-  global HitRecord *hits;
-  uint num_met, num_hits;  ///< rays that have come to their first active block; that hit
-} BandRays;
-
 /// Which of the voxels of cached block b are inside.
 ISO_INLINE ulong inside_of(const CacheReader *cache, const FrameParams *frame, BlockCoords b) {
   volatile global const BlockEntry *entries = cache->table;
@@ -115,7 +107,7 @@ ISO_SELDOM int hit_at_border(const PacketField *field, const FrameParams *frame,
 
 /// Lists a ray that waits at a block of a cell, with its side.
 ISO_INLINE void wait_in_cell(const FrameParams *frame, BlockCoords cell, uint side, uint log_ahead,
-                             uint pixel, const BandRays *rays) {
+                             uint pixel, const LaunchRays *rays) {
   rays->ray_block_ids[pixel] =
       pack_stand(block_id_at(frame, cell.x >> 2, cell.y >> 2, cell.z >> 2), side);
   rays->waiting[atomic_inc(rays->num_waiting)] = pack_entry(pixel, log_ahead, 0);
@@ -124,7 +116,7 @@ ISO_INLINE void wait_in_cell(const FrameParams *frame, BlockCoords cell, uint si
 /// Lanes that may hit at the border at which their band begins, since they were on another side
 /// before, do so, or wait for a block there. Returns those that go on.
 ISO_SELDOM Mask cross_border(const PacketScene *scene, const PacketRays *r, Ints ray_ids,
-                             Ints before, Mask lanes, BandRays *rays) {
+                             Ints before, Mask lanes, LaunchRays *rays) {
   const FrameParams *frame = scene->frame;
   Mask on = ints(0);
   ISO_EACH_LANE(lane, lanes) {
@@ -148,7 +140,7 @@ ISO_SELDOM Mask cross_border(const PacketScene *scene, const PacketRays *r, Ints
 /// The sides of lanes at the end of their band. Those that miss a block there wait, and go through
 /// it again: ISO_SIDE_NOT_CERTAIN.
 ISO_SELDOM Ints sides_of_each(const PacketScene *scene, const PacketRays *r, Ints ray_ids,
-                              Mask lanes, Ints sides, const BandRays *rays) {
+                              Mask lanes, Ints sides, const LaunchRays *rays) {
   Ints found = sides;
   ISO_EACH_LANE(lane, lanes) {
     const Ray ray = ray_of_lane(r, (int)lane);

@@ -106,7 +106,8 @@ bool exceeds_host(const RenderArgs &options, const Drawing &drawing) {
          !ocl::list_devices().empty();
 }
 
-/// Whether levels of detail are chosen among those that the volume has.
+/// Whether levels of detail are chosen among those that the volume has. Small pictures of a time
+/// budget keep the finest level on CPUs: Abilities::levels_pay.
 bool chooses_levels(const RenderArgs &options, const Drawing &drawing) {
   return options.max_surface_error ||
          (options.time_budget && drawing.device && options.renderer_flags.pipeline != "blocks" &&
