@@ -43,6 +43,9 @@ std::vector<ParetoWay> make_ways() {
   for (const double error : {0.5, 2.0}) {
     ways.push_back(
         {.name = fmt::format("--max-surface-error {}", error), .max_surface_error = error});
+    ways.push_back({.name = fmt::format("--max-surface-error {} --by sample", error),
+                    .max_surface_error = error,
+                    .by = Evidence::kSample});
   }
   for (const double ms : {2.0, 5.0, 10.0, 20.0, 50.0})
     ways.push_back({.name = fmt::format("--time-budget {}", ms), .time_budget_ms = ms});

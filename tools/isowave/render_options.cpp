@@ -207,7 +207,7 @@ void add_render_options(CLI::App &command, RenderArgs &options) {
   command.add_flag(
       "--adaptive", options.adaptive,
       "cast one ray per pixel, and the rays of --samples only where neighbours differ, "
-      "as at silhouettes; --depth is of the first rays");
+      "as at silhouettes; pays on the host, for smooth surfaces; --depth is of the first rays");
   command.add_option("--device", options.device,
                      "host: this program draws, without OpenCL; or an OpenCL device: index, cpu, "
                      "gpu, or a part of its name (see `isowave devices`); several, with commas: "

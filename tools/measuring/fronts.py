@@ -3,6 +3,9 @@
 # A point is on the front if it has less of the error than all cheaper ones, by this factor at
 # least: points beside each other would hide each other's names.
 LEAST_GAIN = 0.95
+# Two ways are alike if cost and error differ by less than these factors, which noise explains. The
+# one that is listed first, which has fewer options, then stands for both.
+ALIKE_COST, ALIKE_ERROR = 1.1, 1.02
 
 
 def front_of(points, cost, error):
@@ -10,10 +13,12 @@ def front_of(points, cost, error):
 
     cost, error: names of the values in the points
     """
+    points = list(points)
     front = []
     for point in sorted(points, key=lambda point: (point[cost], point[error])):
         if not front or point[error] < LEAST_GAIN * front[-1][error]:
-            front.append(point)
+            most, worst = ALIKE_COST * point[cost], ALIKE_ERROR * point[error]
+            front.append(next(p for p in points if p[cost] <= most and p[error] <= worst))
     return front
 
 

@@ -1,7 +1,7 @@
 """Charts of speed against accuracy: what `isowave bench pareto` writes, a panel for each volume.
 
 Every point is one way to draw. The front is what no other way beats in both; it is drawn and named.
-The rest is grey. Ways of other programs (peers) are blue and named.
+The rest is grey. Ways of other programs (peers) are blue and named, and the default is black.
 """
 
 import matplotlib.pyplot as plt
@@ -9,7 +9,7 @@ import matplotlib.ticker
 
 from measuring.fronts import front_of, volume_title
 
-FRONT, OTHERS, PEERS = "#D55E00", "#BBBBBB", "#0072B2"
+FRONT, OTHERS, PEERS, DEFAULT = "#D55E00", "#BBBBBB", "#0072B2", "#333333"
 TIMES = {
     "next_ms": "ms from camera to picture, one degree further",
     "cold_ms": "ms to the first picture of an isovalue",
@@ -22,7 +22,8 @@ ERRORS = {
 
 def name_of(point):
     """The name beside a point: options of `isowave render`, shortened."""
-    return point["way"].replace("--device host", "host").replace("--", "")
+    name = point["way"].replace("--device host", "host").replace("--", "")
+    return name.removesuffix(", ranges").removesuffix(" of 8 bits")
 
 
 def spread_names(axis, front, cost, error):
@@ -46,6 +47,18 @@ def spread_names(axis, front, cost, error):
         )
 
 
+def name_beside(axis, point, cost, error, color, above):
+    axis.annotate(
+        name_of(point),
+        (point[cost], point[error]),
+        xytext=(3, above),
+        textcoords="offset points",
+        fontsize=6.5,
+        va="center",
+        color=color,
+    )
+
+
 def draw_panel(axis, document, cost, error, least):
     """least: the error that points without any have, so that they have a place."""
     points = [dict(point) for point in document["points"] if point[cost] is not None]
@@ -53,21 +66,18 @@ def draw_panel(axis, document, cost, error, least):
         point[error] = max(point[error], least)
     front = front_of(points, cost, error)
     names = {point["way"] for point in front}
+    peers = [point for point in points if point["is_peer"]]
     for point in points:
-        if point["is_peer"]:
-            axis.plot(point[cost], point[error], "s", color=PEERS, markersize=4, zorder=3)
-            if point["way"] not in names:
-                axis.annotate(
-                    name_of(point),
-                    (point[cost], point[error]),
-                    xytext=(4, 0),
-                    textcoords="offset points",
-                    fontsize=6,
-                    va="center",
-                    color=PEERS,
-                )
-        elif point["way"] not in names:
+        if not point["is_peer"] and point["way"] not in names:
             axis.plot(point[cost], point[error], "o", color=OTHERS, markersize=3)
+    for number, point in enumerate(sorted(peers, key=lambda point: point[cost])):
+        axis.plot(point[cost], point[error], "s", color=PEERS, markersize=4, zorder=3)
+        if point["way"] not in names:  # by turns above and below
+            name_beside(axis, point, cost, error, PEERS, 7 if number % 2 == 0 else -7)
+    for point in points:
+        if point["way"] == "default" and "default" not in names:
+            axis.plot(point[cost], point[error], "o", color=DEFAULT, markersize=4, zorder=4)
+            name_beside(axis, point, cost, error, DEFAULT, 15)
     axis.plot(
         [point[cost] for point in front],
         [point[error] for point in front],
@@ -89,7 +99,7 @@ def draw(documents, stem, cost, error, save, caption):
     """Writes one chart. cost, error: names of the axes' values in the points."""
     values = [(p[cost], p[error]) for d in documents for p in d["points"] if p[cost] is not None]
     positive = [y for _, y in values if y > 0]
-    least = min(positive, default=1) / 2
+    least = min(positive, default=1) / (2 if len(positive) < len(values) else 1)
     columns = min(2, len(documents))
     rows = -(-len(documents) // columns)
     size = (3.9 * columns + 0.3, 3.0 * rows + 0.9)
@@ -101,7 +111,7 @@ def draw(documents, stem, cost, error, save, caption):
     axes.flat[0].set_xscale("log")
     axes.flat[0].set_yscale("log")
     costs = [x for x, _ in values]
-    axes.flat[0].set_xlim(min(costs) / 6, max(costs) * 2.5)
+    axes.flat[0].set_xlim(min(costs) / 5, max(costs) * 2.5)
     axes.flat[0].set_ylim(least / 1.5, 1.5 * max(positive, default=1))
     figure.supxlabel(TIMES.get(cost, "MB of memory to draw"), fontsize=9, y=0.05)
     figure.supylabel(
