@@ -65,9 +65,9 @@ assert points["--voxel-pixels 1"]["stored_bytes"] > one["stored_bytes"], "levels
 assert all(point["cold_ms"] > 0 < point["next_ms"] for point in points.values())
 front = front_of(points.values(), "next_ms", "flip")
 for a, b in zip(front, front[1:]):
-    assert a["next_ms"] <= b["next_ms"] and a["flip"] > b["flip"]
+    assert a["next_ms"] <= 1.1 * b["next_ms"] and a["flip"] > b["flip"]
 for point in points.values():
-    best = min(p["flip"] for p in front if p["next_ms"] <= point["next_ms"])
+    best = min(p["flip"] for p in front if p["next_ms"] <= 1.1 * point["next_ms"])
     assert 0.95 * best <= point["flip"], point
 EOF
 # What another program drew: here, the truth itself, and the same of another view.
