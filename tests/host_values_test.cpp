@@ -146,8 +146,7 @@ TEST(HostValues, FramesWithinATime) {
   ASSERT_EQ(first.steps.size(), 1u);
   EXPECT_FALSE(first.complete);
   EXPECT_EQ(first.steps[0].size.width, 16u);
-  EXPECT_EQ(first.steps[0].voxel_pixels, 1.0);
-  EXPECT_GT(first.last_level, 0u);
+  EXPECT_EQ(first.steps[0].voxel_pixels, 0.0) << "levels of detail do not pay on the host";
   const auto hits_of = [&](ImageSize size, double voxel_pixels) {
     HostRenderer alone(scene.volume);
     FrameRequest of = request;
@@ -157,7 +156,7 @@ TEST(HostValues, FramesWithinATime) {
     return alone.hits();
   };
   // The largest picture is eight times as large along each axis, and 100 rows are 13 of 8.
-  const std::vector<HitRecord> small = hits_of(first.steps[0].size, 1), shown = host.hits();
+  const std::vector<HitRecord> small = hits_of(first.steps[0].size, 0), shown = host.hits();
   ASSERT_EQ(shown.size(), full.num_rays());
   EXPECT_GT(test::num_hits(small), 30u);
   for (std::size_t row = 0; row < 100; ++row) {
