@@ -1,5 +1,5 @@
 #pragma once
-// Which pixels of a picture of one ray a pixel need more rays.
+// The pixels for which one ray is not enough.
 
 #include <cstdint>
 #include <span>

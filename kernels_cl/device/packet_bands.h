@@ -13,7 +13,7 @@
 #define ISO_GOES_ON 0xC0000000u /* no stand has side 3 */
 #define ISO_HAS_MET 4u          ///< it has come to an active block
 
-/// Which of the voxels of cached block b are inside.
+/// The voxels of cached block b that are inside, a bit for each.
 ISO_INLINE ulong inside_of(const CacheReader *cache, const FrameParams *frame, BlockCoords b) {
   volatile global const BlockEntry *entries = cache->table;
   return cache->inside[entries[find_entry(frame, cache->table, b.x, b.y, b.z)].slot];

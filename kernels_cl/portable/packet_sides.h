@@ -4,9 +4,8 @@
 /// Portable: OpenCL C 1.2 and C++. The file that includes it defines before, besides what
 /// packet_regions.h needs:
 ///
-///     /// Gives lanes in cells (at [3]: x, y, z) their side, ISO_SIDE_*, if all of the cell's
-///     block
-///     /// is on one, or, of lanes `certain` alone, all of the cell. Others stay as they are.
+///     // Gives lanes in cells (at [3]: x, y, z) their side, ISO_SIDE_*, if the cell's block is
+///     // on one side as a whole; lanes `certain` also if the cell is. Others stay as they are.
 ///     void sides_in_cells(const PacketField *field, const FrameParams *frame, const Ints *at,
 ///                         Mask lanes, Mask certain, Ints *sides);
 #ifndef ISOWAVE_PACKET_SIDES_H
