@@ -6,6 +6,7 @@ import matplotlib.ticker
 
 from measuring.fronts import volume_title
 
+# Okabe and Ito's colours, told apart by colour-blind readers too, and a marker for print.
 SOLVERS = {
     "linear": ("#E69F00", "o"),
     "marmitt": ("#56B4E9", "s"),
