@@ -44,7 +44,7 @@ ISO_INLINE CellsAtBorder cells_at_border(const PacketScene *scene, const PacketR
 
 /// The sides of the surface on which rays are at t, of the given lanes, by the blocks and cells
 /// that are on one side as a whole; unknown if they are not in the domain then.
-/// ISO_SIDE_NOT_CERTAIN: the values of a cell must say, or float32 is not enough.
+/// ISO_SIDE_NOT_CERTAIN: a cell's values decide, or float32 is not enough.
 ISO_INLINE Ints find_sides(const PacketScene *scene, const PacketRays *rays, float t, Mask lanes) {
   const CellsAtBorder cells = cells_at_border(scene, rays, t);
   const Mask in_blocks = lanes & cells.within & cells.block_certain;
