@@ -274,39 +274,6 @@ ISO_INLINE PacketSource listed_packet(const View *view, global const uint *entri
   return source;
 }
 
-/// Puts rays that wait back to the blocks where they stand.
-ISO_INLINE void resume(Packet *p, const PacketScene *scene, PacketSource source,
-                       global const uint *ray_block_ids) {
-  Ints at[3];
-  at[0] = at[1] = at[2] = ints(0);
-  ISO_EACH_LANE(lane, source.lanes) {
-    const BlockCoords b = block_coords(scene->frame, ray_block_ids[source.ray_ids[lane]]);
-    at[0][lane] = (int)b.x;
-    at[1][lane] = (int)b.y;
-    at[2][lane] = (int)b.z;
-  }
-  begin_at_blocks(p, scene, at, source.lanes);
-}
-
-/// Walks the rays of a packet on, from their beginning or from where they wait.
-///
-/// begins  1: the first pass of a frame
-/// Out     p->found, p->waits
-ISO_INLINE void march_packet(Packet *p, const PacketScene *scene, PacketSource source, uint begins,
-                             global const uint *ray_block_ids) {
-  Mask lanes = begins != 0 ? on_screen(scene->frame->screen, source) : source.lanes;
-  if (!any(lanes)) return;
-  make_packet_axes(scene->frame, source.column, source.row, p->rays.axis);
-  if (begins != 0) lanes &= enter_box(&p->rays, scene);
-  if (!any(lanes)) return;
-  open_packet(p, scene);
-  if (begins != 0)
-    begin_at_box(p, scene, lanes);
-  else
-    resume(p, scene, source, ray_block_ids);
-  walk_packet(p, scene);
-}
-
 /// Lists the rays that wait, and where.
 ISO_INLINE void list_waiting(const Packet *p, const FrameParams *frame, PacketSource source,
                              Mask moved, volatile global uint *count, global uint *list,
@@ -391,6 +358,39 @@ ISO_INLINE void draw_packet(Packet *p, const PacketScene *scene, int is_active_s
   keep_states(lanes & ((int)ISO_GOES_ON | met | sides), ray_ids, kept, rays->ray_block_ids);
 }
 #else
+/// Puts rays that wait back to the blocks where they stand.
+ISO_INLINE void resume(Packet *p, const PacketScene *scene, PacketSource source,
+                       global const uint *ray_block_ids) {
+  Ints at[3];
+  at[0] = at[1] = at[2] = ints(0);
+  ISO_EACH_LANE(lane, source.lanes) {
+    const BlockCoords b = block_coords(scene->frame, ray_block_ids[source.ray_ids[lane]]);
+    at[0][lane] = (int)b.x;
+    at[1][lane] = (int)b.y;
+    at[2][lane] = (int)b.z;
+  }
+  begin_at_blocks(p, scene, at, source.lanes);
+}
+
+/// Walks the rays of a packet on, from their beginning or from where they wait.
+///
+/// begins  1: the first pass of a frame
+/// Out     p->found, p->waits
+ISO_INLINE void march_packet(Packet *p, const PacketScene *scene, PacketSource source, uint begins,
+                             global const uint *ray_block_ids) {
+  Mask lanes = begins != 0 ? on_screen(scene->frame->screen, source) : source.lanes;
+  if (!any(lanes)) return;
+  make_packet_axes(scene->frame, source.column, source.row, p->rays.axis);
+  if (begins != 0) lanes &= enter_box(&p->rays, scene);
+  if (!any(lanes)) return;
+  open_packet(p, scene);
+  if (begins != 0)
+    begin_at_box(p, scene, lanes);
+  else
+    resume(p, scene, source, ray_block_ids);
+  walk_packet(p, scene);
+}
+
 /// Walks the rays of a packet on, and stores their hits, or where they wait.
 ISO_INLINE void draw_packet(Packet *p, const PacketScene *scene, int is_active_somewhere,
                             PacketSource source, uint begins, LaunchRays *rays) {
