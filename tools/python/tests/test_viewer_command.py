@@ -191,15 +191,18 @@ def run_until_ctrl_c(tmp_path: Path, volume: str) -> tuple[int, str]:
         stderr=subprocess.PIPE,
         text=True,
     ) as process:
-        assert process.stdout is not None
-        url = process.stdout.readline().strip()
-        assert httpx.get(url).status_code == 200
-        with connect(url.replace("http", "ws", 1) + "ws", compression=None) as socket:
-            socket.send(HELLO)
-            receive_until(socket, type="histogram")
-            socket.send(wish_text(1, 0.0))
-            process.send_signal(signal.SIGINT)
-            _, error = process.communicate(timeout=TIMEOUT)
+        try:
+            assert process.stdout is not None
+            url = process.stdout.readline().strip()
+            assert httpx.get(url).status_code == 200
+            with connect(url.replace("http", "ws", 1) + "ws", compression=None) as socket:
+                socket.send(HELLO)
+                receive_until(socket, type="histogram")
+                socket.send(wish_text(1, 0.0))
+                process.send_signal(signal.SIGINT)
+                _, error = process.communicate(timeout=TIMEOUT)
+        finally:
+            process.kill()  # nothing, if it has ended
     return process.returncode, error
 
 

@@ -24,10 +24,11 @@ pytest.importorskip("anywidget")
 
 from isowave.viewer import widget as widget_module  # noqa: E402
 from isowave.viewer.front_end import PARTS, script  # noqa: E402
+from isowave.viewer.protocol import VERSION  # noqa: E402
 from isowave.viewer.widget import MAX_VIEWS, Widget, show  # noqa: E402
 
 TIMEOUT = 60  # seconds; for machines that are busy with other things
-HELLO = {"type": "hello", "version": 2}
+HELLO = {"type": "hello", "version": VERSION}
 WISH: dict[str, Any] = {
     "type": "wish",
     "id": 1,
@@ -38,6 +39,7 @@ WISH: dict[str, Any] = {
     "background": [0, 0, 0],
     "samples": 1,
     "max_error": None,
+    "by": "proof",
     "time_budget": None,
     "ambient": 0,
 }

@@ -11,6 +11,7 @@ from typing import Any
 from viewer_fakes import FakeVolume
 from websockets.sync.client import ClientConnection, connect
 
+from isowave.viewer.protocol import VERSION
 from isowave.viewer.scene import Scene
 from isowave.viewer.server import Limits, Server
 
@@ -18,13 +19,13 @@ from isowave.viewer.server import Limits, Server
 TIMEOUT = 60  # seconds; for machines that are busy with other things
 
 
-HELLO = '{"type": "hello", "version": 2}'
+HELLO = json.dumps({"type": "hello", "version": VERSION})
 
 
 def wish_text(wish_id: int, isovalue: float = 80) -> str:
     wish = {"type": "wish", "id": wish_id, "isovalue": isovalue, "size": [32, 24]}
     wish |= {"camera": None, "color": [1, 1, 1], "background": [0, 0, 0], "samples": 1}
-    return json.dumps(wish | {"max_error": None, "time_budget": None, "ambient": 0})
+    return json.dumps(wish | {"max_error": None, "by": "proof", "time_budget": None, "ambient": 0})
 
 
 @contextmanager
