@@ -150,15 +150,103 @@ TEST(RaySample, IsRarelyWrong) {
   }
 }
 
+/// Rays along -z whose hits face the eye.
+SeenFrame facing(std::vector<float> depth) {
+  SeenFrame frame{std::move(depth), {}, {}};
+  for (const float t : frame.depth) {
+    frame.normals.push_back({0, 0, 1});
+    frame.positions.push_back({0, 0, double{-t}});
+  }
+  return frame;
+}
+
 TEST(RaySample, HitsAreComparedAlongTheRay) {
   const Camera camera{.eye = {0, 0, 0}, .at = {0, 0, -1}, .fovy_deg = 90};
   const float no = INFINITY;  // a pixel at distance 100 is 2 units high
   const SampledShare share =
-      compare_hits(camera, {1, 100}, std::array{100.0f, 100.0f, no, 100.0f, no},
-                   std::array{101.9f, 102.2f, no, no, 100.0f}, 1);
+      compare_hits(camera, {1, 100}, std::array{facing({100.0f, 100.0f, no, 100.0f, no})},
+                   std::array{facing({101.9f, 102.2f, no, no, 100.0f})}, 1);
   EXPECT_EQ(share.num_rays, 5u);
   EXPECT_EQ(share.num_hits, 4u);
   EXPECT_EQ(share.num_within, 1u);
+}
+
+TEST(RaySample, HitsAreComparedBesideTheRay) {
+  const Camera camera{.eye = {0, 0, 0}, .at = {0, 0, -1}, .fovy_deg = 90};
+  const float no = INFINITY;
+  const std::array finest{facing({100, 100, 100, no, no}), facing({120, no, 120, 100, no})},
+      // Between the two, behind the only one, behind both, a silhouette that moved, a false one.
+      other{facing({110, 110, 125, 100, 100}), facing({100, 100, 100, no, 120})};
+  EXPECT_EQ(compare_hits(camera, {1, 100}, finest, other, 1).num_within, 2u);
+  EXPECT_EQ(compare_hits(camera, {1, 100}, other, finest, 1).num_within, 2u)
+      << "in both directions";
+}
+
+/// Where the rays of a square picture meet a ball.
+///
+/// camera  at the origin
+SeenFrame frame_of_ball(const Camera &camera, std::uint32_t side, const glm::dvec3 &center,
+                        double radius) {
+  const glm::dvec3 forward = glm::normalize(camera.at - camera.eye),
+                   right = glm::normalize(glm::cross(forward, camera.up)),
+                   up = glm::cross(right, forward);
+  const double pixel = pixel_size_at(camera, side, 1);
+  SeenFrame frame;
+  for (std::uint32_t y = 0; y < side; ++y) {
+    for (std::uint32_t x = 0; x < side; ++x) {
+      const double u = (x + 0.5 - side / 2.0) * pixel, v = (side / 2.0 - y - 0.5) * pixel;
+      const glm::dvec3 way = glm::normalize(forward + u * right + v * up);
+      const double along = glm::dot(way, center),
+                   in2 = along * along - glm::dot(center, center) + radius * radius;
+      const double t = in2 < 0 ? INFINITY : along - std::sqrt(in2);
+      const glm::dvec3 at = in2 < 0 ? glm::dvec3(0) : t * way, normal = (at - center) / radius;
+      frame.depth.push_back(static_cast<float>(t));
+      frame.normals.push_back({float(normal.x), float(normal.y), float(normal.z)});
+      frame.positions.push_back({at.x, at.y, at.z});
+    }
+  }
+  return frame;
+}
+
+std::vector<SeenFrame> frames_of_ball(const Camera &camera, std::uint32_t side, double limit,
+                                      const glm::dvec3 &center, double radius) {
+  std::vector<SeenFrame> seen;
+  for (const Camera &beside : cameras_beside(camera, side, limit))
+    seen.push_back(frame_of_ball(beside, side, center, radius));
+  return seen;
+}
+
+/// A ball keeps the error if its surface moves by less: also where rays graze it, which is far
+/// along the ray.
+TEST(RaySample, SilhouettesMayMoveAcrossTheRay) {
+  const Camera camera{.eye = {0, 0, 0}, .at = {0, 0, -1}, .fovy_deg = 60};
+  constexpr std::uint32_t kSide = 200;
+  const glm::dvec3 center(0, 0, -100);
+  const double radius = 35;
+  for (const double limit : {0.5, 1.0, 2.0, 4.0}) {
+    const double pixel = pixel_size_at(camera, kSide, 100), error = limit * pixel;
+    const std::vector truth = frames_of_ball(camera, kSide, limit, center, radius);
+    const auto share_of = [&](const glm::dvec3 &at, double with_radius) {
+      const std::vector other = frames_of_ball(camera, kSide, limit, at, with_radius);
+      return compare_hits(camera, {kSide, kSide}, truth, other, limit).share();
+    };
+    for (const double by : {-0.6, 0.6}) {
+      EXPECT_GT(share_of(center, radius + by * error), 0.999) << limit;
+      EXPECT_GT(share_of(center + glm::dvec3(by * error, 0, 0), radius), 0.999) << limit;
+    }
+    for (const double by : {-2.5, 2.5}) {
+      EXPECT_LT(share_of(center, radius + by * error), 0.5) << limit;
+      EXPECT_LT(share_of(center + glm::dvec3(by * error, 0, 0), radius), 0.99) << limit;
+      EXPECT_LT(share_of(center + glm::dvec3(0, 0, by * error), radius), 0.2) << limit;
+    }
+    // A ball that is lost, or that stands where there is none.
+    const double near = pixel_size_at(camera, kSide, 65), small = 0.3 * near;
+    const std::vector ball = frames_of_ball(camera, kSide, limit, {near / 2, near / 2, -65}, small),
+                      nothing = frames_of_ball(camera, kSide, limit, {0, 0, 100}, small);
+    EXPECT_EQ(compare_hits(camera, {kSide, kSide}, ball, nothing, limit).num_within, 0u);
+    EXPECT_EQ(compare_hits(camera, {kSide, kSide}, nothing, ball, limit).num_within, 0u);
+    EXPECT_GT(compare_hits(camera, {kSide, kSide}, nothing, ball, limit).num_hits, 0u);
+  }
 }
 
 FrameRequest request_by_sample(const Camera &camera, ImageSize size, float isovalue,
@@ -204,12 +292,25 @@ FrameRequest random_request(const VolumeInfo &info, ImageSize size, Random &rand
                            std::exp2(random.between(-1, 3)));
 }
 
+/// Share of all hits of a frame that keep an error, with a detail and at full detail.
+double share_of_frame(Renderer &renderer, const FrameRequest &request, const Detail &detail,
+                      double limit) {
+  std::vector<SeenFrame> truth, drawn;
+  for (const Camera &camera : cameras_beside(request.camera, request.size->height, limit)) {
+    renderer.render(with_detail(seen_from(camera, request), {}));
+    truth.push_back(seen_frame(renderer));
+    renderer.render(with_detail(seen_from(camera, request), detail));
+    drawn.push_back(seen_frame(renderer));
+  }
+  return compare_hits(request.camera, *request.size, truth, drawn, limit).share();
+}
+
 /// In at least 95 of 100 scenes, 99 % of all hits keep the error that was judged by a sample. A
 /// judge that always says yes fails.
 TEST(RaySample, PromiseHoldsInRandomScenes) {
   constexpr ImageSize kSize{320, 240};
   ASSERT_GT(sample_of(kSize).stride, 1u);
-  int num_kept = 0, num_coarse = 0, num_kept_always = 0;
+  int num_kept = 0, num_coarse = 0, num_lost_always = 0;
   Random random{std::mt19937(1)};
   for (int volumes = 0; volumes < 10; ++volumes) {
     const CompressedVolume volume = random_volume(random);
@@ -218,26 +319,22 @@ TEST(RaySample, PromiseHoldsInRandomScenes) {
     for (int views = 0; views < 10; ++views) {
       FrameRequest request = random_request(volume.info, kSize, random);
       const double limit = request.max_surface_error.value();
-      num_coarse += bounded.render(request).detail->detail.voxel_pixels > 0;
-      const std::vector<float> drawn = bounded.depth();
+      const Detail chosen = bounded.render(request).detail->detail;
       request.max_surface_error.reset();
       request.by = Evidence::kProof;
-      renderer.render(request);
-      const std::vector<float> truth = renderer.depth();
-      const auto is_kept = [&](const std::vector<float> &depth) {
-        return compare_hits(request.camera, kSize, truth, depth, limit).share() >= kSampledShare;
+      const auto is_kept = [&](const Detail &detail) {
+        return share_of_frame(renderer, request, detail, limit) >= kSampledShare;
       };
-      num_kept += is_kept(drawn);
-      renderer.render(with_detail(request, {8, 0}));
-      num_kept_always += is_kept(renderer.depth());
+      num_coarse += chosen.voxel_pixels > 0;
+      num_kept += chosen == Detail{} || is_kept(chosen);
+      if (num_lost_always <= 5) num_lost_always += !is_kept({8, 0});
     }
   }
   EXPECT_GE(num_kept, 95);
   EXPECT_GE(num_coarse, 30);
-  EXPECT_LT(num_kept_always, 95) << "a judge that always says yes";
+  EXPECT_GT(num_lost_always, 5) << "a judge that always says yes";
   RecordProperty("kept", num_kept);
   RecordProperty("coarse", num_coarse);
-  RecordProperty("kept_always", num_kept_always);
 }
 
 TEST(RaySample, NeedsNoErrors) {

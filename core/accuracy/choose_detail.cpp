@@ -128,7 +128,9 @@ class Judge {
 
   double best() const { return best_; }  ///< share of the pixels, at full detail
   double median() const { return median_; }
-  const std::vector<float> &finest_depth() const { return finest_depth_; }
+  const std::vector<float> &finest_depth() const {
+    return finest_.empty() ? finest_depth_ : finest_.front().depth;
+  }
   const std::vector<DetailChoice::Try> &tries() const { return tries_; }
   /// A sample with a detail that was tried.
   SampledShare sample_with(const Detail &detail) const {
@@ -141,18 +143,26 @@ class Judge {
  private:
   double kept_with(const Detail &detail) {
     const FrameRequest request = with_detail(request_, detail);
-    renderer_.render(request);
-    std::vector<float> depth = renderer_.depth();
-    tries_.push_back({detail, by_ == Evidence::kSample ? sampled(std::move(depth))
-                                                       : certified(request, std::move(depth))});
-    return tries_.back().kept;
+    double kept;
+    if (by_ == Evidence::kSample) {
+      kept = sampled(request);
+    } else {
+      renderer_.render(request);
+      kept = certified(request, renderer_.depth());
+    }
+    tries_.push_back({detail, kept});
+    return kept;
   }
 
-  double sampled(std::vector<float> depth) {
-    leave_out_beside(depth, INFINITY);
-    if (samples_.empty()) finest_depth_ = depth;
-    const SampledShare own =
-        compare_hits(request_.camera, size_, finest_depth_, depth, max_surface_error_);
+  double sampled(const FrameRequest &request) {
+    std::vector<SeenFrame> seen;
+    for (const Camera &camera : cameras_beside(request.camera, size_.height, max_surface_error_)) {
+      renderer_.render(seen_from(camera, request));
+      seen.push_back(seen_frame(renderer_));
+    }
+    leave_out_beside(seen.front().depth, INFINITY);
+    if (finest_.empty()) finest_ = seen;
+    const SampledShare own = compare_hits(request.camera, size_, finest_, seen, max_surface_error_);
     samples_.push_back(of_first(renderer_.team(), std::vector{own}).front());
     return samples_.back().share();
   }
@@ -184,7 +194,8 @@ class Judge {
   double max_surface_error_;
   Evidence by_;
   std::vector<std::uint32_t> beside_;  ///< rays of the sample beside the picture
-  std::vector<float> finest_depth_;
+  std::vector<float> finest_depth_;    ///< by proof
+  std::vector<SeenFrame> finest_;      ///< by sample
   std::vector<DetailChoice::Try> tries_;
   std::vector<SampledShare> samples_;  ///< by sample: of each try
   double best_ = 0, median_ = 0;

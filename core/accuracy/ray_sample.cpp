@@ -1,6 +1,8 @@
 #include "core/accuracy/ray_sample.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <glm/glm.hpp>
 
 namespace isowave::core {
 
@@ -20,6 +22,28 @@ double probability(std::uint64_t num_beyond, std::uint64_t num_hits, double shar
   return sum;
 }
 
+/// Whether a ray's hit is near what frames show along the ray and beside it.
+///
+/// error  [world units]
+bool is_near(const SeenFrame &frame, std::span<const SeenFrame> shown, std::size_t ray,
+             double error) {
+  const auto vector_of = [](const auto &v) { return glm::dvec3(v[0], v[1], v[2]); };
+  const double t = double{frame.depth[ray]};
+  double least = INFINITY, largest = -INFINITY;
+  for (const SeenFrame &beside : shown) {
+    const double seen = double{beside.depth[ray]};
+    if (std::isinf(seen)) continue;
+    least = std::min(least, seen);
+    largest = std::max(largest, seen);
+    const glm::dvec3 apart = vector_of(frame.positions[ray]) - vector_of(beside.positions[ray]),
+                     normal = vector_of(beside.normals[ray]);
+    if (glm::length(apart) <= kGrazing * error && glm::length(normal) > 0.5 &&
+        std::abs(glm::dot(apart, normal)) <= error)
+      return true;
+  }
+  return t >= least - error && t <= largest + error;
+}
+
 }  // namespace
 
 ImageSize sample_of(ImageSize size) {
@@ -28,16 +52,39 @@ ImageSize sample_of(ImageSize size) {
   return size;
 }
 
-SampledShare compare_hits(const Camera &camera, ImageSize size, std::span<const float> finest,
-                          std::span<const float> other, double limit) {
+SeenFrame seen_frame(Renderer &renderer) {
+  const FrameArrays arrays =
+      renderer.fetch({.depth = true, .normals = true, .positions = true}, {});
+  return {arrays.depth.copy(), arrays.normals.copy(), arrays.positions.copy()};
+}
+
+std::vector<Camera> cameras_beside(const Camera &camera, std::uint32_t height, double pixels) {
+  constexpr int kDirections = 8;
+  std::vector<Camera> cameras{camera};
+  for (const double by : {pixels, pixels / 2}) {
+    for (int i = 0; i < kDirections; ++i) {
+      const double angle = 2 * M_PI / kDirections * i;
+      cameras.push_back(aside(camera, by * glm::dvec2(std::cos(angle), std::sin(angle)), height));
+    }
+  }
+  return cameras;
+}
+
+SampledShare compare_hits(const Camera &camera, ImageSize size, std::span<const SeenFrame> finest,
+                          std::span<const SeenFrame> other, double limit) {
   SampledShare sample;
-  sample.num_rays = finest.size();
-  for (std::size_t ray = 0; ray < finest.size(); ++ray) {
-    const double t = double{other[ray]}, true_t = double{finest[ray]};
-    if (std::isinf(t) && std::isinf(true_t)) continue;
-    ++sample.num_hits;
-    if (std::isinf(t) || std::isinf(true_t)) continue;
-    sample.num_within += std::abs(t - true_t) <= limit * pixel_size_at(camera, size.height, t);
+  sample.num_rays = finest.front().depth.size();
+  for (std::size_t ray = 0; ray < sample.num_rays; ++ray) {
+    const bool hits_finest = !std::isinf(finest.front().depth[ray]),
+               hits_other = !std::isinf(other.front().depth[ray]);
+    const auto error_at = [&](const SeenFrame &frame) {
+      return limit * pixel_size_at(camera, size.height, double{frame.depth[ray]});
+    };
+    sample.num_hits += hits_finest || hits_other;
+    sample.num_within +=
+        (hits_finest || hits_other) &&
+        (!hits_finest || is_near(finest.front(), other, ray, error_at(finest.front()))) &&
+        (!hits_other || is_near(other.front(), finest, ray, error_at(other.front())));
   }
   return sample;
 }

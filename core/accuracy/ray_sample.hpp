@@ -4,10 +4,12 @@
 // Rays are drawn at random places, one in each square of the picture (ImageSize::stride), always at
 // the same places for the same size. Each place of the picture has the same chance.
 
+#include <array>
 #include <cstdint>
 #include <span>
+#include <vector>
 
-#include "core/frame/frame_stats.hpp"
+#include "core/frame/renderer.hpp"
 #include "core/view/camera.hpp"
 #include "core/view/frame.hpp"
 
@@ -19,18 +21,34 @@ inline constexpr double kSampledShare = 0.99, kConfidence = 0.95;
 /// A sample of about 2^13 of the rays of that picture; all of its rays if it has no more.
 ImageSize sample_of(ImageSize size);
 
+/// The hits of one frame's rays.
+struct SeenFrame {
+  std::vector<float> depth;                      ///< [num_rays] see HitRecord::t
+  std::vector<std::array<float, 3>> normals;     ///< [num_rays] see world_normal()
+  std::vector<std::array<double, 3>> positions;  ///< [num_rays] see hit_position()
+};
+
+/// The hits of the renderer's last frame; of a team's other ranks than 0: none.
+SeenFrame seen_frame(Renderer &renderer);
+
+/// Cameras whose frames show what is at most so many pixels beside a camera's rays. The first one
+/// is the camera, the others' rays pass in eight directions, so many pixels away and half as many.
+std::vector<Camera> cameras_beside(const Camera &camera, std::uint32_t height, double pixels);
+
 /// Compares the hits of a sample's rays.
 ///
-/// size    of the sample
-/// finest  [num_rays] depth at full detail [world units]; infinity: no hit
-/// other   [num_rays] depth with another detail
-/// limit   the error [pixels]
+/// size           of the sample
+/// finest, other  frames of cameras_beside() at full detail, and with another detail
+/// limit          the error [pixels]
 ///
-/// A ray with two hits is within the error if these are at most so far apart along the ray, in
-/// pixels at the other detail's hit. A ray with one hit is not within the error, even if a
-/// neighbour's hit is near. A ray without any counts for nothing. Does not set `lowest`.
-SampledShare compare_hits(const Camera &camera, ImageSize size, std::span<const float> finest,
-                          std::span<const float> other, double limit);
+/// A ray with a hit is within the error if each of its hits, at full detail and with the other one,
+/// is near what the other detail shows along the ray or beside it: at most `limit` from the tangent
+/// plane of a hit that is at most kGrazing times as far away; or no more than `limit` nearer than
+/// all of these hits or farther. So silhouettes may move by `limit`, too. Does not set `lowest`.
+SampledShare compare_hits(const Camera &camera, ImageSize size, std::span<const SeenFrame> finest,
+                          std::span<const SeenFrame> other, double limit);
+/// A surface that rays graze is found by its tangent planes, within so many times the error.
+inline constexpr double kGrazing = 16;
 
 /// Lower end of the one-sided Clopper-Pearson interval of confidence kConfidence: the smallest
 /// share for which it is not improbable (1 - kConfidence) that so many rays or more are within the

@@ -122,6 +122,27 @@ Camera turned(const Camera &camera, double degrees) {
   return result;
 }
 
+Camera aside(const Camera &camera, const glm::dvec2 &pixels, std::uint32_t height) {
+  const glm::dvec3 forward = camera.at - camera.eye,
+                   right = glm::normalize(glm::cross(forward, camera.up)),
+                   up = glm::normalize(glm::cross(right, forward)),
+                   to = pixels.x * right + pixels.y * up;
+  const double by = glm::length(to);
+  Camera result = camera;
+  if (by == 0) return result;
+  if (camera.parallel_height) {
+    const glm::dvec3 step = to * pixel_size_at(camera, height, 1);
+    result.eye += step;
+    result.at += step;
+    return result;
+  }
+  const glm::dquat turn = glm::angleAxis(by * pixel_size_at(camera, height, 1),
+                                         glm::normalize(glm::cross(forward, to)));
+  result.at = camera.eye + turn * forward;
+  result.up = turn * camera.up;
+  return result;
+}
+
 Camera in_parallel(const Camera &camera) {
   Camera result = camera;
   const double distance = glm::length(camera.at - camera.eye);

@@ -40,6 +40,12 @@ void check_camera(const Camera &camera, std::string_view what);
 
 /// The camera, moved around what it looks at, about the axis `up`.
 Camera turned(const Camera &camera, double degrees);
+/// The camera, whose rays all pass beside its own: turned about its eye, or moved in parallel
+/// projection.
+///
+/// pixels  to the right and up, as pixel_size_at() counts them
+/// height  of the picture [pixels]
+Camera aside(const Camera &camera, const glm::dvec2 &pixels, std::uint32_t height);
 /// The same view in parallel projection, in which what is as far away as `at` has the same size.
 Camera in_parallel(const Camera &camera);
 /// The height of a pixel at a distance from the eye [world units].
