@@ -18,7 +18,6 @@ Abilities TwinRenderer::abilities() const {
   abilities.fewer_planes = true;
   abilities.bounds = true;
   abilities.given_rays = true;
-  abilities.pixel_rays = true;
   abilities.solver = solver_;
   return abilities;
 }
@@ -27,27 +26,21 @@ std::vector<VolumeInfo> TwinRenderer::levels() const {
   return level_infos(volume_, true);
 }
 
-/// The twin with the request's voxels.
-Twin &TwinRenderer::twin_for(const FrameRequest &request) {
+FrameStats TwinRenderer::render(const FrameRequest &request) {
+  check(request, abilities());
+  size_ = size_of(request, abilities());
   const Decoded wanted{request.voxel_pixels, request.voxel_error, request.bound};
   if (!twin_ || wanted != decoded_) {
     twin_.emplace(volume_, request.voxel_pixels, request.voxel_error, request.bound);
     decoded_ = wanted;
   }
-  return *twin_;
-}
-
-FrameStats TwinRenderer::render(const FrameRequest &request) {
-  check(request, abilities());
-  size_ = size_of(request, abilities());
-  Twin &twin = twin_for(request);
   const auto begin = std::chrono::steady_clock::now();
   frame_ = make_frame_params(volume_.info, request.camera, size_, request.isovalue);
-  hits_ = twin.render(request.camera, size_, request.isovalue, solver_, request.normals);
+  hits_ = twin_->render(request.camera, size_, request.isovalue, solver_, request.normals);
   open_ = {};
   if (request.ambient_rays != 0)
     open_ =
-        twin.open(request.camera, size_, request.isovalue, hits_, request.ambient_rays, solver_);
+        twin_->open(request.camera, size_, request.isovalue, hits_, request.ambient_rays, solver_);
   FrameStats stats;
   stats.rays_hit = static_cast<std::uint64_t>(
       std::ranges::count_if(hits_, [](const HitRecord &hit) { return std::isfinite(hit.t); }));
@@ -64,21 +57,6 @@ FrameStats TwinRenderer::render(const FrameRequest &request) {
 
 std::vector<HitRecord> TwinRenderer::cast_rays(std::span<const WorldRay>, float, Normals) {
   throw Error("the scalar reference casts no rays of any origin: draw on a device or the host");
-}
-
-std::vector<HitRecord> TwinRenderer::cast_pixels(const FrameRequest &request,
-                                                 std::span<const std::uint32_t> pixels) {
-  const ImageSize size = size_of(request, abilities());
-  const std::vector<HitRecord> all =
-      twin_for(request).render(request.camera, size, request.isovalue, solver_, request.normals);
-  std::vector<HitRecord> hits;
-  for (const std::uint32_t pixel : pixels) {
-    for (std::uint32_t i = 0; i < size.samples * size.samples; ++i) {
-      hits.push_back(all[sample_ray(size.ray_columns(), size.samples, pixel % size.width,
-                                    pixel / size.width, i)]);
-    }
-  }
-  return hits;
 }
 
 Camera TwinRenderer::camera(std::span<const float> isovalues, std::optional<ImageSize> size) {

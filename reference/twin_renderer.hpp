@@ -25,9 +25,6 @@ class TwinRenderer : public Renderer {
   /// Throws  Error: the twin casts no rays of any origin
   std::vector<HitRecord> cast_rays(std::span<const WorldRay> rays, float isovalue,
                                    Normals normals) override;
-  /// Draws all pixels.
-  std::vector<HitRecord> cast_pixels(const FrameRequest &request,
-                                     std::span<const std::uint32_t> pixels) override;
   Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {}) override;
 
   ImageSize size() const override { return size_; }
@@ -43,8 +40,6 @@ class TwinRenderer : public Renderer {
     FieldBound bound = FieldBound::kNone;
     bool operator==(const Decoded &) const = default;
   };
-
-  Twin &twin_for(const FrameRequest &request);
 
   const CompressedVolume &volume_;
   ImageSize largest_;

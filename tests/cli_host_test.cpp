@@ -59,8 +59,7 @@ class CliHost : public testing::Test {
 
 TEST_F(CliHost, DrawsTheBitsOfADevice) {
   for (const std::string options :
-       {"", "--exact --samples 2 --ambient 3", "--samples 3 --adaptive",
-        "--tolerance 0.5 --levels all --voxel-pixels 2",
+       {"", "--exact --samples 2 --ambient 3", "--tolerance 0.5 --levels all --voxel-pixels 2",
         "--tolerance 0.5 --voxel-error 2 --normals cell --parallel", "--max-surface-error 2",
         "--max-surface-error 2 --by sample", "--time-budget 60000"}) {
     const auto [on_host, text] =

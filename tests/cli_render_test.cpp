@@ -518,11 +518,6 @@ TEST(CliRender, BadOptionsAreOneLineAndLeaveNothing) {
   expect_refused(good + "--device 99" + to, "99");
   expect_refused(good + "--samples 0" + to, "--samples");
   expect_refused(good + "--samples 9" + to, "--samples");
-  expect_refused(good + "--adaptive" + to, "--adaptive needs --samples 2 or more");
-  for (const std::string other : {"--ambient 1", "--voxel-pixels 1", "--time-budget 9"})
-    expect_refused(good + "--adaptive --samples 2 " + other + to, "--adaptive");
-  expect_refused(good + "--adaptive --samples 2 --depth " + quoted(out / "a.npy"),
-                 "no picture is written");
   expect_refused(kGyroid + " -i 128 --size 16384x8192 --samples 2" + to,
                  "an image of 16384 x 8192");
   expect_refused(quoted(out / "missing.raw") + " -i 1" + to, "no such file");

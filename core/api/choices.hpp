@@ -1,10 +1,9 @@
 #pragma once
-// Private to core/api: adaptive samples, and frames within an error or a time, by any renderer.
+// Private to core/api: frames within an error or a time, by any renderer.
 
 #include <memory>
 #include <utility>
 
-#include "core/accuracy/adaptive_renderer.hpp"
 #include "core/accuracy/bounded_renderer.hpp"
 #include "core/frame/timed_renderer.hpp"
 
@@ -16,7 +15,6 @@ struct Choices {
 };
 
 /// Adds frames within an error: by sample, and by proof if the other renderer has bounds.
-/// A renderer of rays of some pixels also gets adaptive samples.
 ///
 /// volume  that this process's renderer was made for; must outlive the result
 /// rate    of the whole volume [bits per voxel]
@@ -24,8 +22,6 @@ inline std::unique_ptr<core::Renderer> add_choices(std::unique_ptr<core::Rendere
                                                    const Choices &choices,
                                                    const core::CompressedVolume &volume,
                                                    double rate) {
-  if (renderer->abilities().pixel_rays)
-    renderer = std::make_unique<core::AdaptiveRenderer>(std::move(renderer));
   renderer = std::make_unique<core::BoundedRenderer>(std::move(renderer), volume, rate);
   if (choices.with_time_budget)
     renderer = std::make_unique<core::TimedRenderer>(std::move(renderer));

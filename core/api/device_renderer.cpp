@@ -30,7 +30,6 @@ Choices choices_of(const RendererOptions &options) {
 core::Abilities abilities_on_device(const RendererOptions &options, const Volume &volume) {
   core::Abilities abilities =
       core::DeviceRenderer::abilities_of(core_options(options, volume.num_levels()));
-  abilities.adaptive = abilities.pixel_rays;
   abilities.surface_error = options.with_bounds;
   abilities.sampled_error = true;
   abilities.time_budget = options.with_time_budget;

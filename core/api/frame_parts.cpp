@@ -32,8 +32,6 @@ FrameStatistics public_statistics(const core::FrameStats &stats, std::uint64_t n
   result.normals_ms = stats.normals.ms;
   result.ambient_passes = stats.ambient.passes;
   result.ambient_ms = stats.ambient.ms;
-  result.refined_pixels = stats.refined_pixels;
-  result.refined_ms = stats.refined_ms;
   result.decoded_blocks += stats.normals.decoded_blocks + stats.ambient.decoded_blocks;
   for (const core::LaterPasses *later : {&stats.normals, &stats.ambient}) {
     for (const auto &[stage, ms] : later->stage_ms) result.stage_ms[stage] += ms;
@@ -81,7 +79,6 @@ core::FrameRequest core_request(const FrameRequest &request, const core::Compres
   result.max_surface_error = request.max_surface_error;
   result.by = static_cast<core::Evidence>(request.by);
   result.time_budget_ms = request.time_budget_ms;
-  result.adaptive = request.adaptive;
   return result;
 }
 
@@ -193,12 +190,10 @@ DetailChoice public_choice(const core::DetailChoice &choice) {
 
 void describe_frame(const FrameRequest &request, const core::FrameStats &stats, Frame &frame) {
   frame.size = request.size;
-  core::ImageSize size = core_size(request.size);
-  if (request.adaptive) size.samples = 1;
+  const core::ImageSize size = core_size(request.size);
   frame.rows = size.ray_rows();
   frame.columns = size.ray_columns();
-  const std::uint64_t of_pixel = std::uint64_t{request.size.samples} * request.size.samples;
-  frame.statistics = public_statistics(stats, size.num_rays() + stats.refined_pixels * of_pixel);
+  frame.statistics = public_statistics(stats, size.num_rays());
 }
 
 std::vector<core::WorldRay> world_rays(std::span<const Ray> rays) {

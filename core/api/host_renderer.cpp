@@ -22,8 +22,7 @@ std::unique_ptr<core::Renderer> make_on_host(const core::CompressedVolume &volum
 
 core::Abilities abilities_on_host(const core::CompressedVolume &volume) {
   core::Abilities abilities = core::HostRenderer::abilities_of(volume);
-  abilities.adaptive = abilities.surface_error = abilities.sampled_error = abilities.time_budget =
-      true;
+  abilities.surface_error = abilities.sampled_error = abilities.time_budget = true;
   return abilities;
 }
 

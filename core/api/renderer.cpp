@@ -97,8 +97,6 @@ Frame Renderer::Implementation::draw(const FrameRequest &request) {
   frame.statistics.total_ms = core::ms_since(begin);
   frame.statistics.hits = renderer_->num_hits(stats);
   if (request.want_bounds) {  // last, since it draws frames of its own
-    wanted.size = core::first_rays(wanted, core_size(request.size));
-    wanted.adaptive = false;
     const std::vector<float> depth =
         request.want_depth ? frame.depth.to_vector() : renderer_->depth();
     last_.certificate = core::certify(*renderer_, volume_, wanted, depth);

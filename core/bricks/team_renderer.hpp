@@ -38,7 +38,7 @@ class TeamRenderer : public Renderer {
 
   Abilities abilities() const override {
     Abilities abilities = renderer_.abilities();
-    abilities.cells = abilities.pixel_rays = false;
+    abilities.cells = false;
     return abilities;
   }
   Team &team() override { return team_; }

@@ -46,10 +46,6 @@ struct FrameRequest {
   /// Rays from each hit that find out how much of the sky it sees, for shading
   /// (kernels_cl/portable/ambient.h); 0: each hit sees all of it.
   std::uint32_t ambient_rays = 0;
-  /// One ray for each pixel, and size.samples^2 rays only for pixels that differ from neighbours
-  /// (pixels_to_refine()). Such a pixel has the colour that it has without this. All other arrays
-  /// of the frame are of the first rays, one for each pixel.
-  bool adaptive = false;
   /// Largest distance to the true surface [pixels]. voxel_pixels and voxel_error are then chosen so
   /// that most pixels keep it. The true surface is that of the volume before compression, or by
   /// sample that of full detail.
@@ -59,14 +55,6 @@ struct FrameRequest {
   std::optional<double> time_budget_ms{};
   OnPass on_pass{};
 };
-
-/// The picture of the rays that depth, normals and positions of the request are of.
-///
-/// size  of the request's picture
-inline ImageSize first_rays(const FrameRequest &request, ImageSize size) {
-  if (request.adaptive) size.samples = 1;
-  return size;
-}
 
 /// The same request with another camera.
 inline FrameRequest seen_from(const Camera &camera, FrameRequest request) {

@@ -104,8 +104,6 @@ struct FrameStats {
   std::size_t first_level = 0, last_level = 0;  ///< levels of detail that drew; 0: the finest
   double total_ms = 0;  ///< wall clock, from camera to finished hit buffer on the device
   std::uint64_t rays_hit = 0;
-  std::uint64_t refined_pixels = 0;   ///< with FrameRequest::adaptive: those of more than one ray
-  double refined_ms = 0;              ///< wall clock, a part of total_ms: of their further rays
   std::uint64_t uploaded_blocks = 0;  ///< from a compressed volume on the host ...
   std::uint64_t uploaded_bytes = 0;   ///< ... and their bytes
   /// Whether on_pass stopped the frame before the picture was finished. The hit buffer then holds

@@ -26,23 +26,6 @@ void check_choices(const FrameRequest &request) {
     throw Error("the surface of a bound has no error: draw the volume itself");
 }
 
-/// Checks what cannot be asked for together with FrameRequest::adaptive.
-void check_adaptive(const FrameRequest &request, ImageSize size) {
-  if (!request.adaptive) return;
-  if (size.samples == 1)
-    throw Error("adaptive samples need 2 x 2 rays a pixel or more: give samples from 2 on");
-  const auto refuse = [](bool is_asked, const char *text) {
-    if (is_asked)
-      throw Error("adaptive samples are of the finest level of detail: leave out {}", text);
-  };
-  refuse(request.voxel_pixels > 0, "voxel_pixels");
-  refuse(request.max_surface_error.has_value(), "max_surface_error");
-  if (request.time_budget_ms)
-    throw Error("adaptive samples keep no time: leave out time_budget_ms");
-  if (request.ambient_rays != 0)
-    throw Error("adaptive samples have no ambient rays: leave out one of the two");
-}
-
 }  // namespace
 
 void check_max_surface_error(double max_surface_error) {
@@ -64,8 +47,7 @@ void check(const FrameRequest &request, const Abilities &abilities) {
   if (request.max_surface_error) check_max_surface_error(*request.max_surface_error);
   if (request.time_budget_ms) check_time_budget(*request.time_budget_ms);
   check_choices(request);
-  check_adaptive(request, size);
-  if (first_rays(request, size).num_rays() > abilities.most_rays) {
+  if (size.num_rays() > abilities.most_rays) {
     throw Error("{}x{} pixels have more than the {} rays that the renderer was made for",
                 size.width, size.height, abilities.most_rays);
   }
@@ -85,9 +67,6 @@ void check(const FrameRequest &request, const Abilities &abilities) {
        "device by a renderer that was made with_bounds");
   need(request.ambient_rays != 0, abilities.given_rays,
        "ambient rays need a renderer that was made with_rays");
-  need(request.adaptive, abilities.adaptive,
-       "this renderer has no adaptive samples: leave out adaptive, or draw on the host, or on one "
-       "device by a renderer that was made with_rays");
   const bool by_sample = request.by == Evidence::kSample;
   need(request.max_surface_error && !by_sample, abilities.surface_error,
        "this renderer knows no bounds of the error: leave out max_surface_error, judge it by "
@@ -102,10 +81,6 @@ void check(const FrameRequest &request, const Abilities &abilities) {
 Image8 Renderer::shade(const Appearance &appearance) {
   const FrameArrays arrays = fetch({.picture = true}, appearance);
   return arrays.picture.empty() ? Image8{} : image_of(size(), arrays.picture);
-}
-
-std::vector<HitRecord> Renderer::cast_pixels(const FrameRequest &, std::span<const std::uint32_t>) {
-  throw std::logic_error("a renderer without Abilities::pixel_rays casts no rays of some pixels");
 }
 
 void Renderer::keep_picture() {

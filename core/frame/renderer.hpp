@@ -27,8 +27,6 @@ struct Abilities {
   bool fewer_planes = false;       ///< FrameRequest::voxel_error
   bool bounds = false;             ///< FrameRequest::bound
   bool given_rays = false;         ///< FrameRequest::ambient_rays, and cast_rays()
-  bool pixel_rays = false;         ///< cast_pixels()
-  bool adaptive = false;           ///< FrameRequest::adaptive
   bool cells = true;               ///< hits name their cell: HitRecord::block_id
   bool surface_error = false;      ///< FrameRequest::max_surface_error, by proof
   bool sampled_error = false;      ///< FrameRequest::max_surface_error, by sample
@@ -77,17 +75,6 @@ class Renderer {
   /// Throws  Error: no ability for given rays; what make_index_rays() throws; the isovalue is NaN
   virtual std::vector<HitRecord> cast_rays(std::span<const WorldRay> rays, float isovalue,
                                            Normals normals) = 0;
-
-  /// The first hits of the rays of some pixels, those that render() would find for the request with
-  /// as many rays for all pixels. The picture of the last frame stays. For renderers with
-  /// Abilities::pixel_rays; others throw std::logic_error.
-  ///
-  /// request  with a size; its finest level of detail draws, without ambient rays
-  /// pixels   row * width + column of the picture, ascending
-  /// Returns  [pixel][samples][samples], see sample_ray()
-  /// Throws   Error: as render()
-  virtual std::vector<HitRecord> cast_pixels(const FrameRequest &request,
-                                             std::span<const std::uint32_t> pixels);
 
   /// A view in which isosurfaces fill a picture of that size, see surface_camera(); no size: the
   /// largest.
@@ -155,10 +142,6 @@ class RendererAround : public Renderer {
   std::vector<HitRecord> cast_rays(std::span<const WorldRay> rays, float isovalue,
                                    Normals normals) override {
     return inner().cast_rays(rays, isovalue, normals);
-  }
-  std::vector<HitRecord> cast_pixels(const FrameRequest &request,
-                                     std::span<const std::uint32_t> pixels) override {
-    return inner().cast_pixels(request, pixels);
   }
   Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {}) override {
     return inner().camera(isovalues, size);

@@ -145,26 +145,15 @@ inline void ambient(const FrameParams &frame, const HostField &field, const RayT
   }
 }
 
-inline void store_rgb(uint rgba, std::uint8_t *rgb) {
-  for (uint channel = 0; channel < 3; ++channel)
-    rgb[channel] = static_cast<std::uint8_t>(rgba >> (8 * channel));
-}
-
 inline void shade(const FrameParams &frame, const ShadeParams &params, uint samples, uint row,
                   const HitRecord *hits, const uchar *open_counts, uint num_ambient,
                   std::uint8_t *rgb) {
   const uint columns = frame.view.width / samples;
   for (uint column = 0; column < columns; ++column) {
-    store_rgb(shade_pixel(&frame, &params, samples, column, row, hits, open_counts, num_ambient),
-              rgb + std::size_t{3} * column);
-  }
-}
-
-inline void shade_pixels(const FrameParams &frame, const ShadeParams &params, uint samples,
-                         std::span<const uint> pixels, const HitRecord *hits, std::uint8_t *rgb) {
-  for (const uint pixel : pixels) {
-    store_rgb(shade_samples(&frame, &params, samples, pixel, hits), rgb + std::size_t{3} * pixel);
-    hits += samples * samples;
+    const uint rgba =
+        shade_pixel(&frame, &params, samples, column, row, hits, open_counts, num_ambient);
+    for (uint channel = 0; channel < 3; ++channel)
+      rgb[3 * column + channel] = static_cast<std::uint8_t>(rgba >> (8 * channel));
   }
 }
 
@@ -202,11 +191,6 @@ ISO_WHOLE_LOOP void shade_anywhere(const FrameParams &frame, const ShadeParams &
                                    uint samples, uint row, const HitRecord *hits,
                                    const uchar *open_counts, uint num_ambient, std::uint8_t *rgb) {
   shade(frame, params, samples, row, hits, open_counts, num_ambient, rgb);
-}
-ISO_WHOLE_LOOP void shade_pixels_anywhere(const FrameParams &frame, const ShadeParams &params,
-                                          uint samples, std::span<const uint> pixels,
-                                          const HitRecord *hits, std::uint8_t *rgb) {
-  shade_pixels(frame, params, samples, pixels, hits, rgb);
 }
 
 /// One level is a special case of several.
@@ -270,11 +254,6 @@ ISO_WIDE_LOOP void shade_wide(const FrameParams &frame, const ShadeParams &param
                               uint num_ambient, std::uint8_t *rgb) {
   shade(frame, params, samples, row, hits, open_counts, num_ambient, rgb);
 }
-ISO_WIDE_LOOP void shade_pixels_wide(const FrameParams &frame, const ShadeParams &params,
-                                     uint samples, std::span<const uint> pixels,
-                                     const HitRecord *hits, std::uint8_t *rgb) {
-  shade_pixels(frame, params, samples, pixels, hits, rgb);
-}
 
 uint trace_sse4(const FrameParams &frame, const HostField &field, const RayTile &tile,
                 bool is_smooth, HitRecord *hits) {
@@ -304,15 +283,13 @@ bool is_wide() {
 constexpr HostLoops kLoops[] = {
     {decode_anywhere, ranges_anywhere, inside_anywhere, trace_rays<trace_rays_of_levels_anywhere>,
      trace_rays<trace_rays_of_levels_anywhere>, trace_rays_of_levels_anywhere,
-     trace_rays_of_levels_anywhere, cast_anywhere, ambient_anywhere, shade_anywhere,
-     shade_pixels_anywhere},
+     trace_rays_of_levels_anywhere, cast_anywhere, ambient_anywhere, shade_anywhere},
 #ifdef ISO_HAS_WIDE_LOOPS
     {decode_anywhere, ranges_anywhere, inside_anywhere, trace_sse4,
      trace_rays<trace_rays_of_levels_anywhere>, trace_levels_sse4, trace_rays_of_levels_anywhere,
-     cast_anywhere, ambient_anywhere, shade_anywhere, shade_pixels_anywhere},
+     cast_anywhere, ambient_anywhere, shade_anywhere},
     {decode_wide, ranges_wide, inside_wide, trace_wide, trace_rays<trace_rays_of_levels_wide>,
-     trace_levels_wide, trace_rays_of_levels_wide, cast_wide, ambient_wide, shade_wide,
-     shade_pixels_wide},
+     trace_levels_wide, trace_rays_of_levels_wide, cast_wide, ambient_wide, shade_wide},
 #endif
 };
 

@@ -151,13 +151,6 @@ struct HostLoops {
   void (*shade)(const FrameParams &frame, const ShadeParams &params, uint samples, uint row,
                 const HitRecord *hits, const uchar *open_counts, uint num_ambient,
                 std::uint8_t *rgb);
-  /// Shades some pixels of the frame's picture, all of whose hits see all of the sky.
-  ///
-  /// pixels  row * columns of the picture + column
-  /// hits    [pixel][samples][samples]
-  /// rgb     [height / samples][width / samples][3]; that of other pixels stays
-  void (*shade_pixels)(const FrameParams &frame, const ShadeParams &params, uint samples,
-                       std::span<const uint> pixels, const HitRecord *hits, std::uint8_t *rgb);
 };
 
 /// The loops that this processor can run, the fastest last.

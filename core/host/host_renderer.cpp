@@ -76,7 +76,6 @@ Abilities HostRenderer::abilities_of(const CompressedVolume &volume) {
   Abilities abilities;
   abilities.levels = !volume.coarser_levels.empty();
   abilities.fewer_planes = abilities.bounds = abilities.given_rays = abilities.kept_picture = true;
-  abilities.pixel_rays = true;
   return abilities;
 }
 
@@ -221,48 +220,6 @@ std::vector<HitRecord> HostRenderer::cast_rays(std::span<const WorldRay> rays, f
     host_loops().cast(frame, field, index_rays.data() + begin,
                       static_cast<uint>(std::min<std::size_t>(kRunRays, rays.size() - begin)),
                       normals == Normals::kSmooth, hits.data() + begin);
-  });
-  return hits;
-}
-
-std::vector<HitRecord> HostRenderer::cast_pixels(const FrameRequest &request,
-                                                 std::span<const std::uint32_t> pixels) {
-  const ImageSize size = size_of(request, abilities());
-  const std::vector<FrameParams> frames =
-      make_level_frames(levels_.infos(), request.camera, size, request.isovalue, 0);
-  const std::vector<HostLevel> drawing = levels_.open(frames, request.voxel_error, request.bound);
-  const HostLevel &level = drawing.front();
-  const bool is_smooth = request.normals == Normals::kSmooth;
-  const std::uint32_t samples = size.samples, columns = size.ray_columns();
-  // Tiles are traced into a picture of all rays, of which only their pages are ever used.
-  if (!pixel_hits_ || pixel_hits_size_.num_rays() < size.num_rays()) {
-    pixel_hits_.reset();
-    pixel_hits_.emplace(size.num_rays() * sizeof(HitRecord));
-    pixel_hits_size_ = size;
-  }
-  auto *const all = static_cast<HitRecord *>(pixel_hits_->data());
-  std::vector<HitRecord> hits(pixels.size() * samples * samples);
-  levels_.room().run(size.height, [&](std::uint64_t row, bool is_alone) {
-    const auto first_at = [&](std::uint64_t pixel) {
-      return static_cast<std::size_t>(std::ranges::lower_bound(pixels, pixel) - pixels.begin());
-    };
-    const std::size_t end = first_at((row + 1) * size.width);
-    for (std::size_t i = first_at(row * size.width), end_of_run = i; i < end; i = end_of_run) {
-      while (end_of_run < end && pixels[end_of_run] - pixels[i] == end_of_run - i) ++end_of_run;
-      const std::uint32_t x = pixels[i] % size.width, y = pixels[i] / size.width,
-                          num_pixels = static_cast<std::uint32_t>(end_of_run - i);
-      const RayTile tile{x * samples, y * samples, (x + num_pixels) * samples, (y + 1) * samples};
-      for (std::size_t r = tile.begin_y; r < tile.end_y; ++r)
-        std::fill(all + r * columns + tile.begin_x, all + r * columns + tile.end_x, no_hit());
-      const HostLoops &loops = host_loops();
-      (is_alone ? loops.trace_rays : loops.trace)(level.frame, level.field,
-                                                  within(tile, level.frame.screen), is_smooth, all);
-      for (std::size_t p = i; p < end_of_run; ++p) {
-        HitRecord *const of_pixel = hits.data() + p * samples * samples;
-        for (std::uint32_t s = 0; s < samples * samples; ++s)
-          of_pixel[s] = all[sample_ray(columns, samples, pixels[p] % size.width, y, s)];
-      }
-    }
   });
   return hits;
 }

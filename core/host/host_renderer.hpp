@@ -12,7 +12,6 @@
 #include <span>
 #include <vector>
 
-#include "core/base/reserved_memory.hpp"
 #include "core/frame/renderer.hpp"
 #include "core/host/host_levels.hpp"
 
@@ -50,9 +49,6 @@ class HostRenderer : public Renderer {
   FrameStats render(const FrameRequest &request) override;
   std::vector<HitRecord> cast_rays(std::span<const WorldRay> rays, float isovalue,
                                    Normals normals) override;
-  /// Takes memory for the pages of a picture with all rays that have these pixels', and keeps it.
-  std::vector<HitRecord> cast_pixels(const FrameRequest &request,
-                                     std::span<const std::uint32_t> pixels) override;
   Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {}) override;
 
   ImageSize size() const override { return size_; }
@@ -94,8 +90,6 @@ class HostRenderer : public Renderer {
   OpenCounts open_;
   std::vector<HitRecord> kept_;
   ImageSize kept_size_;
-  std::optional<ReservedMemory> pixel_hits_;  ///< for cast_pixels(): of all rays
-  ImageSize pixel_hits_size_;
   HostMemory memory_;
 };
 

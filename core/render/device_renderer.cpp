@@ -203,7 +203,7 @@ Abilities DeviceRenderer::abilities_of(const RendererOptions &options) {
   abilities.levels = options.with_levels;
   abilities.fewer_planes = true;
   abilities.bounds = options.with_bounds;
-  abilities.given_rays = abilities.pixel_rays = options.with_given_rays;
+  abilities.given_rays = options.with_given_rays;
   abilities.kept_picture = options.with_kept_picture;
   abilities.solver = options.solver;
   return abilities;
@@ -288,31 +288,12 @@ Camera DeviceRenderer::camera(std::span<const float> isovalues, std::optional<Im
                         size.value_or(options_.size));
 }
 
-std::vector<HitRecord> DeviceRenderer::cast_rays(std::span<const WorldRay> rays, float isovalue,
-                                                 Normals normals) {
+std::vector<HitRecord> DeviceRenderer::cast_rays(std::span<const WorldRay> world_rays,
+                                                 float isovalue, Normals normals) {
   check_has_given();
   if (is_brick()) throw Error("rays of any origin go on in other bricks");
   if (std::isnan(isovalue)) throw Error("the isovalue is NaN: give a number");
-  FrameRequest request;
-  request.isovalue = isovalue;
-  request.normals = normals;
-  return cast(make_index_rays(blocks_.levels[0].info, rays), request);
-}
-
-std::vector<HitRecord> DeviceRenderer::cast_pixels(const FrameRequest &request,
-                                                   std::span<const std::uint32_t> pixels) {
-  check_has_given();
-  if (is_brick()) throw Error("rays of a brick's pixels go on in other bricks");
-  const ImageSize size = size_of(request, abilities());
-  return cast(make_pixel_rays(
-                  make_frame_params(blocks_.levels[0].info, request.camera, size, request.isovalue),
-                  size.samples, pixels),
-              request);
-}
-
-/// The hits of rays in the finest level of the request's field.
-std::vector<HitRecord> DeviceRenderer::cast(std::span<const IndexRay> rays,
-                                            const FrameRequest &request) {
+  const std::vector<IndexRay> rays = make_index_rays(blocks_.levels[0].info, world_rays);
   Wavefront &wavefront = rays_;
   const FrameOfPicture kept{wavefront, wavefront.frame};
   // As many rays as the buffers hold at a time, as a picture.
@@ -323,16 +304,17 @@ std::vector<HitRecord> DeviceRenderer::cast(std::span<const IndexRay> rays,
     const std::size_t num_left = rays.size() - hits.size(),
                       num_rows = std::min((num_left + columns - 1) / columns,
                                           wavefront.num_rays / columns);
-    const std::span of_part = rays.subspan(hits.size(), std::min(num_left, num_rows * columns));
+    const std::span of_part =
+        std::span(rays).subspan(hits.size(), std::min(num_left, num_rows * columns));
     std::vector<GivenRay> given(num_rows * columns);
     std::ranges::transform(of_part, given.begin(), &IndexRay::ray);
     wavefront.given.write(given);
-    open_frame(frames_of_rays(columns, static_cast<std::uint32_t>(num_rows), request.isovalue),
-               decoded_values(request), request.bound, RaySource::kGiven);
+    open_frame(frames_of_rays(columns, static_cast<std::uint32_t>(num_rows), isovalue),
+               decoded_values({}), FieldBound::kNone, RaySource::kGiven);
     const OnPass never_stops;
     Frame frame{never_stops, 1};
     run(*given_rays_, frame);
-    if (request.normals == Normals::kSmooth) run(normals_of_given_, frame);
+    if (normals == Normals::kSmooth) run(normals_of_given_, frame);
     blocks_.close(recycled_blocks(frame.stats), true);
     part.resize(given.size());
     wavefront.given_hits.read(part);

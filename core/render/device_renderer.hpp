@@ -63,8 +63,6 @@ class DeviceRenderer : public Renderer {
   Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {}) override;
   std::vector<HitRecord> cast_rays(std::span<const WorldRay> rays, float isovalue,
                                    Normals normals) override;
-  std::vector<HitRecord> cast_pixels(const FrameRequest &request,
-                                     std::span<const std::uint32_t> pixels) override;
 
   std::vector<HitRecord> hits() override;
   /// Replaces the last frame's hits, which fetch() shows.
@@ -139,7 +137,6 @@ class DeviceRenderer : public Renderer {
   void begin_frame(const FrameRequest &request);
   void open_frame(std::vector<FrameParams> frames, const std::vector<DecodedValues> &values,
                   FieldBound bound, RaySource source);
-  std::vector<HitRecord> cast(std::span<const IndexRay> rays, const FrameRequest &request);
   std::vector<FrameParams> frames_of_rays(std::uint32_t columns, std::uint32_t rows,
                                           float isovalue) const;
   std::vector<DecodedValues> decoded_values(const FrameRequest &request) const;

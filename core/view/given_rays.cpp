@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "core/base/error.hpp"
-#include "kernels_cl/portable/grid_dda.h"
 
 namespace isowave::core {
 
@@ -39,22 +38,6 @@ std::vector<IndexRay> make_index_rays(const VolumeInfo &info, std::span<const Wo
                               world_to_index * rays[i].direction, i);
   }
   return index_rays;
-}
-
-std::vector<IndexRay> make_pixel_rays(const FrameParams &frame, std::uint32_t samples,
-                                      std::span<const std::uint32_t> pixels) {
-  const std::uint32_t columns = frame.view.width / samples;
-  std::vector<IndexRay> rays;
-  rays.reserve(pixels.size() * samples * samples);
-  for (const std::uint32_t pixel : pixels) {
-    for (std::uint32_t i = 0; i < samples * samples; ++i) {
-      const Ray ray = make_ray(
-          &frame, sample_ray(frame.view.width, samples, pixel % columns, pixel / columns, i));
-      rays.push_back(
-          {{ray.x.o, ray.y.o, ray.z.o, ray.x.d, ray.y.d, ray.z.d, 0}, frame.view.t_scale});
-    }
-  }
-  return rays;
 }
 
 }  // namespace isowave::core

@@ -152,13 +152,6 @@ ISO_INLINE Ray make_ray(const FrameParams *frame, uint pixel) {
   return r;
 }
 
-/// The number of a pixel's ray: sample i of samples x samples, row by row from the top.
-///
-/// ray_columns  rays of a row of the picture
-ISO_INLINE uint sample_ray(uint ray_columns, uint samples, uint column, uint row, uint i) {
-  return (row * samples + i / samples) * ray_columns + column * samples + i % samples;
-}
-
 /// A ray of a list, of a whole volume.
 ISO_INLINE Ray make_given_ray(GivenRay given) {
   Ray r;

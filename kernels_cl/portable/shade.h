@@ -107,28 +107,6 @@ ISO_INLINE Color shade_ray(const FrameParams *frame, const ShadeParams *p, uint 
                     fma(p->surface_b, light, highlight));
 }
 
-/// The colours of a pixel's rays so far, added in one order on every device.
-typedef struct PixelSum {
-  float r, g, b;
-  uint alpha;  ///< 255 if a ray hits, else 0
-} PixelSum;
-
-/// hit, open: see shade_ray()
-ISO_INLINE void add_ray(PixelSum *sum, const FrameParams *frame, const ShadeParams *p, uint ray_id,
-                        ISO_GLOBAL const HitRecord *hit, float open) {
-  const Color color =
-      shade_ray(frame, p, ray_id, hit->t, hit->grad_x, hit->grad_y, hit->grad_z, open);
-  sum->r += color.r;
-  sum->g += color.g;
-  sum->b += color.b;
-  if (hit->t != INFINITY) sum->alpha = 255;
-}
-
-ISO_INLINE uint mean_pixel(PixelSum sum, uint samples) {
-  const float share = 1.0f / (float)(samples * samples);
-  return pixel_of(sum.r * share, sum.g * share, sum.b * share, sum.alpha);
-}
-
 /// RGBA of the pixel at a column and row of the picture, 8 bits each, red in bits 0..7. The pixel
 /// has samples times samples rays of the frame. A is 255 if any of them hits, else 0.
 ///
@@ -137,33 +115,23 @@ ISO_INLINE uint mean_pixel(PixelSum sum, uint samples) {
 ISO_INLINE uint shade_pixel(const FrameParams *frame, const ShadeParams *p, uint samples,
                             uint column, uint row, ISO_GLOBAL const HitRecord *hits,
                             ISO_GLOBAL const uchar *open_counts, uint num_ambient) {
-  PixelSum sum = {0.0f, 0.0f, 0.0f, 0};
-  uint i;
-  if (samples == 1 && hits[row * frame->view.width + column].t == INFINITY)
-    return background_pixel(p);
-  for (i = 0; i < samples * samples; ++i) {
-    const uint ray_id = sample_ray(frame->view.width, samples, column, row, i);
-    add_ray(&sum, frame, p, ray_id, hits + ray_id,
-            num_ambient == 0 ? 1.0f : (float)open_counts[ray_id] / (float)num_ambient);
+  const float share = 1.0f / (float)(samples * samples);
+  const uint first_ray = row * samples * frame->view.width + column * samples;
+  float r = 0.0f, g = 0.0f, b = 0.0f;
+  uint i, a = 0;
+  if (samples == 1 && hits[first_ray].t == INFINITY) return background_pixel(p);
+  for (i = 0; i < samples * samples; ++i) { /* in one order on every device */
+    const uint ray_id = first_ray + i / samples * frame->view.width + i % samples;
+    const Color color =
+        shade_ray(frame, p, ray_id, hits[ray_id].t, hits[ray_id].grad_x, hits[ray_id].grad_y,
+                  hits[ray_id].grad_z,
+                  num_ambient == 0 ? 1.0f : (float)open_counts[ray_id] / (float)num_ambient);
+    r += color.r;
+    g += color.g;
+    b += color.b;
+    if (hits[ray_id].t != INFINITY) a = 255;
   }
-  return mean_pixel(sum, samples);
-}
-
-/// RGBA of a pixel from a list of the hits of its rays, all of which see all of the sky.
-///
-/// pixel  row * columns of the picture + column
-/// hits   [samples * samples]
-ISO_INLINE uint shade_samples(const FrameParams *frame, const ShadeParams *p, uint samples,
-                              uint pixel, ISO_GLOBAL const HitRecord *hits) {
-  const uint columns = frame->view.width / samples;
-  PixelSum sum = {0.0f, 0.0f, 0.0f, 0};
-  uint i;
-  for (i = 0; i < samples * samples; ++i) {
-    add_ray(&sum, frame, p,
-            sample_ray(frame->view.width, samples, pixel % columns, pixel / columns, i), hits + i,
-            1.0f);
-  }
-  return mean_pixel(sum, samples);
+  return pixel_of(r * share, g * share, b * share, a);
 }
 
 /// The normal of a hit in world space, of length 1, away from larger values; 0 if there is no hit,

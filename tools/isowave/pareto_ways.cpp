@@ -25,11 +25,6 @@ std::vector<ParetoWay> make_ways() {
     ways.push_back(
         {.name = fmt::format("--rate 4 --samples {}", samples), .rate = 4, .samples = samples});
   }
-  for (const std::uint32_t samples : {2u, 4u}) {
-    ways.push_back({.name = fmt::format("--samples {} --adaptive", samples),
-                    .samples = samples,
-                    .adaptive = true});
-  }
   for (const std::uint32_t part : {2u, 4u, 8u})
     ways.push_back({.name = fmt::format("1/{} size", part), .shrunk = part});
   for (const double pixels : {1.0, 2.0, 4.0})
@@ -57,10 +52,6 @@ std::vector<ParetoWay> make_ways() {
     ways.push_back({.name = fmt::format("--ambient {}", rays), .ambient_rays = rays});
   ways.push_back({.name = "BCMC", .drawn_by = DrawnBy::kTriangles});
   ways.push_back({.name = "--device host", .drawn_by = DrawnBy::kHost});
-  ways.push_back({.name = "--device host --samples 4 --adaptive",
-                  .drawn_by = DrawnBy::kHost,
-                  .samples = 4,
-                  .adaptive = true});
   for (const std::uint32_t samples : {2u, 4u}) {
     ways.push_back({.name = fmt::format("--device host --samples {}", samples),
                     .drawn_by = DrawnBy::kHost,
@@ -84,17 +75,15 @@ ImageSize size_of(const ParetoWay &way, ImageSize shown) {
 std::unique_ptr<Renderer> make_renderer(ocl::Device &device, const CompressedVolume &volume,
                                         const ParetoWay &way, ImageSize shown) {
   const ImageSize size = size_of(way, shown);
-  if (way.drawn_by == DrawnBy::kHost) {
-    return add_choices(std::make_unique<HostRenderer>(volume, HostRendererOptions{.largest = size}),
-                       {}, volume, volume.rate());
-  }
+  if (way.drawn_by == DrawnBy::kHost)
+    return std::make_unique<HostRenderer>(volume, HostRendererOptions{.largest = size});
   if (way.drawn_by == DrawnBy::kTriangles)
     return std::make_unique<MeshRenderer>(device, volume, MeshRendererOptions{.size = size});
   RendererFlags flags{.pipeline = way.pipeline, .solver = way.solver, .values = {}};
   flags.values.with_levels = way.needs_levels() && !volume.coarser_levels.empty();
   flags.values.with_bounds = way.needs_bounds();
   flags.values.with_kept_picture = way.time_budget_ms.has_value();
-  flags.values.with_given_rays = way.ambient_rays != 0 || way.adaptive;
+  flags.values.with_given_rays = way.ambient_rays != 0;
   return add_choices(
       std::make_unique<DeviceRenderer>(device, volume, to_renderer_options(flags, size)),
       {.with_time_budget = flags.values.with_kept_picture}, volume, volume.rate());
@@ -110,7 +99,6 @@ FrameRequest request_of(const ParetoWay &way, ImageSize shown, float isovalue, d
   request.by = way.by;
   request.time_budget_ms = way.time_budget_ms;
   request.normals = way.normals;
-  request.adaptive = way.adaptive;
   request.ambient_rays = way.ambient_rays;
   return request;
 }

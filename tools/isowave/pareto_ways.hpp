@@ -30,7 +30,6 @@ struct ParetoWay {
   DrawnBy drawn_by = DrawnBy::kDevice;
   std::string pipeline = "rays", solver{to_string(kDefaultSolver)};
   std::uint32_t samples = 1;
-  bool adaptive = false;     ///< many rays only for pixels that differ from neighbours
   std::uint32_t shrunk = 1;  ///< the picture has this part of the size, and is enlarged
   double voxel_pixels = 0;
   double voxel_error = 0;  ///< as a part of the range of values

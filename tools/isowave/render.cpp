@@ -80,7 +80,7 @@ void set_wanted(RenderArgs &options) {
   RendererOptions &wanted = options.renderer_flags.values;
   wanted.with_shading = asks_for_picture(options);
   wanted.with_kept_picture = options.time_budget.has_value();
-  wanted.with_given_rays = options.ambient_rays != 0 || options.adaptive;
+  wanted.with_given_rays = options.ambient_rays != 0;
   wanted.with_bounds = draws_bounds(options);
   options.frame.compression.measure_error |= wanted.with_bounds;
   if (!wanted.with_shading) options.normals = to_string(Normals::kCell);  // no picture shows them
@@ -151,8 +151,7 @@ void load_bricks(const RenderArgs &options, Drawing &drawing) {
 }
 
 std::unique_ptr<Renderer> make_core_renderer(RenderArgs &options, Drawing &drawing) {
-  ImageSize size = drawing.views.size;
-  if (options.adaptive) size.samples = 1;  // at a time
+  const ImageSize size = drawing.views.size;
   options.renderer = to_renderer_options(options.renderer_flags, size);
   if (options.reference)
     return std::make_unique<TwinRenderer>(drawing.whole, size, options.renderer.solver);
@@ -218,7 +217,6 @@ isowave::FrameRequest FrameOfMany::request() const {
   request.voxel_error = options.frame.voxel_error;
   request.normals = static_cast<isowave::Normals>(normals_from_string(options.normals));
   request.ambient_rays = options.ambient_rays;
-  request.adaptive = options.adaptive;
   request.max_surface_error = options.max_surface_error;
   if (options.by == "sample") request.by = isowave::Evidence::kSample;
   request.time_budget_ms = options.time_budget;
@@ -299,17 +297,10 @@ ordered_json draw_frame(const FrameOfMany &frame, ordered_json &own) {
              {"written_ms", ms},
              {"composition_ms", drawing.of_team->composition().ms - composed_before}};
   } else {
-    fmt::print("isovalue {}, view {}: {} rays hit, {}{}{:.1f} ms\n", frame.isovalue, frame.view,
+    fmt::print("isovalue {}, view {}: {} rays hit, {}{:.1f} ms\n", frame.isovalue, frame.view,
                with_commas(num_hits),
                drawing.on_host() ? "" : fmt::format("{} passes, ", last.stats.passes.size()),
-               options.adaptive
-                   ? fmt::format("{} pixels refined, ", with_commas(last.stats.refined_pixels))
-                   : "",
                drawn.statistics.total_ms);
-    if (options.adaptive) {
-      entry["refined_pixels"] = last.stats.refined_pixels;
-      entry["refined_ms"] = last.stats.refined_ms;
-    }
     entry["total_ms"] = drawn.statistics.total_ms;
   }
   warn_of_isovalue(drawing.volume(), frame.isovalue);

@@ -91,19 +91,11 @@ void check_choice(const RenderArgs &options) {
         "--max-surface-error chooses the detail: leave out --voxel-error and --voxel-pixels");
 }
 
-/// Checks --adaptive, and the options that it cannot be used with.
-void check_adaptive(const CLI::App &command, const RenderArgs &options) {
-  if (!options.adaptive) return;
-  if (options.frame.samples == 1) throw Error("--adaptive needs --samples 2 or more");
-  refuse_options(command, {"--ambient", "--voxel-pixels", "--max-surface-error", "--time-budget"},
-                 "--adaptive casts further rays without it: leave out one of the two");
-}
-
 }  // namespace
 
 void check_options(const CLI::App &command, const RenderArgs &options, const Team &team) {
   if (team.size() > 1) {
-    refuse_options(command, {"--reference", "--verbose", "--adaptive"},
+    refuse_options(command, {"--reference", "--verbose"},
                    fmt::format("cannot be used with mpirun: {} processes draw parts of the volume",
                                team.size()));
   } else {
@@ -112,7 +104,7 @@ void check_options(const CLI::App &command, const RenderArgs &options, const Tea
   if (options.reference && !options.progress_dir.empty())
     throw Error("--reference has no passes: leave out --progress-dir");
   if (!asks_for_picture(options)) {
-    refuse_options(command, {"--color", "--background", "--normals", "--ambient", "--adaptive"},
+    refuse_options(command, {"--color", "--background", "--normals", "--ambient"},
                    "no picture is written: give --output");
   }
   if (options.stats.empty())
@@ -122,7 +114,6 @@ void check_options(const CLI::App &command, const RenderArgs &options, const Tea
   with_fewer_planes({}, options.frame.voxel_error);  // or throws
   check_voxel_pixels(options.voxel_pixels);
   check_choice(options);
-  check_adaptive(command, options);
 }
 
 std::string find_device_option(const CLI::App &command) {
@@ -173,10 +164,9 @@ namespace {
 
 /// Options of every day come first, those of researchers last.
 void group_render_options(CLI::App &command) {
-  group_options(
-      command, "Options of every day",
-      {"--help", "--isovalue", "--output", "--size", "--samples", "--adaptive", "--orbit",
-       "--cameras", "--parallel", "--color", "--background", "--normals", "--ambient", "--device"});
+  group_options(command, "Options of every day",
+                {"--help", "--isovalue", "--output", "--size", "--samples", "--orbit", "--cameras",
+                 "--parallel", "--color", "--background", "--normals", "--ambient", "--device"});
   group_volume_options(command);
   group_compression_options(command);
   group_options(command, "Precision and time",
@@ -204,10 +194,6 @@ void add_render_options(CLI::App &command, RenderArgs &options) {
                   "picture's pixels")
       ->check(CLI::Range(1u, ImageSize::kMaxSamples))
       ->capture_default_str();
-  command.add_flag(
-      "--adaptive", options.adaptive,
-      "cast one ray per pixel, and the rays of --samples only where neighbours differ, "
-      "as at silhouettes; pays on the host, for smooth surfaces; --depth is of the first rays");
   command.add_option("--device", options.device,
                      "host: this program draws, without OpenCL; or an OpenCL device: index, cpu, "
                      "gpu, or a part of its name (see `isowave devices`); several, with commas: "

@@ -33,7 +33,6 @@ struct RenderArgs {
   double voxel_pixels = 0;                  ///< FrameRequest::voxel_pixels
   std::string normals = "smooth";
   std::uint32_t ambient_rays = 0;
-  bool adaptive = false;
   std::string bricks;  ///< XxYxZ, or "active"
 };
 

@@ -149,7 +149,6 @@ nlohmann::ordered_json options_json(const RenderArgs &options, ImageSize size,
   json["voxel_pixels"] = options.voxel_pixels;
   json["normals"] = options.normals;
   json["ambient"] = options.ambient_rays;
-  json["adaptive"] = options.adaptive;
   return json;
 }
 

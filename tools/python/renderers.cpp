@@ -81,8 +81,6 @@ nb::dict statistics_dict(const isowave::FrameStatistics &statistics) {
   result["normals_ms"] = statistics.normals_ms;
   result["ambient_passes"] = statistics.ambient_passes;
   result["ambient_ms"] = statistics.ambient_ms;
-  result["refined_pixels"] = statistics.refined_pixels;
-  result["refined_ms"] = statistics.refined_ms;
   result["uploaded_bytes"] = statistics.uploaded_bytes;
   result["first_level"] = statistics.first_level;
   result["last_level"] = statistics.last_level;

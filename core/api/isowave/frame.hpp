@@ -82,12 +82,6 @@ struct FrameRequest {
   /// Rays from each hit, up to 255, that find out how much of the sky it sees, which shows depth.
   /// Each takes about as long as a frame without any. Needs with_rays.
   std::uint32_t ambient_rays = 0;
-  /// Casts one ray for each pixel first, and size.samples^2 rays only for pixels that differ from
-  /// neighbours, as at silhouettes. These get the colour that they have without this. Depth,
-  /// normals, positions, hits and bounds are those of the first rays, one for each pixel. Needs
-  /// size.samples from 2 on, and with_rays; not with levels of detail, ambient rays or a time
-  /// budget.
-  bool adaptive = false;
   /// Largest distance to the true surface [pixels]. voxel_pixels and voxel_error are then chosen so
   /// that most pixels keep it. By proof, the true surface is that of the volume before compression;
   /// needs with_bounds. By sample, it is that of full detail, and 99 % of the rays that hit it keep
@@ -145,7 +139,6 @@ void for_each_field(Request &request, const Visit &visit) {
   visit("bound", request.bound);
   visit("normals", request.normals);
   visit("ambient_rays", request.ambient_rays);
-  visit("adaptive", request.adaptive);
   visit("max_surface_error", request.max_surface_error);
   visit("by", request.by);
   visit("time_budget_ms", request.time_budget_ms);
@@ -166,8 +159,6 @@ struct FrameStatistics {
   double normals_ms = 0;                          ///< part of total_ms
   std::uint32_t ambient_passes = 0;               ///< those of `passes` for ambient rays
   double ambient_ms = 0;                          ///< part of total_ms
-  std::uint64_t refined_pixels = 0;               ///< if adaptive: pixels with all their rays
-  double refined_ms = 0;                          ///< part of total_ms
   std::uint64_t uploaded_bytes = 0;               ///< from a compressed volume on the host
   std::uint32_t first_level = 0, last_level = 0;  ///< levels of detail that drew; 0: the finest
   /// Wall clock, from camera to the wanted arrays in the host's memory, without Frame::bounds.
@@ -199,7 +190,7 @@ struct DetailChoice {
 };
 
 /// A finished frame. Arrays that were not asked for are empty. Rays are [rows][columns], row 0 at
-/// the top: size.samples times as many as pixels along each axis, or if adaptive as many.
+/// the top: size.samples times as many as pixels along each axis.
 struct Frame {
   ImageSize size{};
   std::uint32_t rows = 0, columns = 0;  ///< numbers of rays

@@ -19,8 +19,7 @@ struct DeviceInfo;
 /// Options of a renderer. A renderer takes its memory when it is made. Without memory_budget
 /// and cache_blocks, the cache grows between frames if frames need more blocks.
 struct RendererOptions {
-  /// Largest picture: frames may have as many rays, in any shape; adaptive ones as many pixels.
-  ImageSize largest{};
+  ImageSize largest{};              ///< largest picture: frames may have as many rays, in any shape
   std::uint64_t memory_budget = 0;  ///< bound on device memory [bytes]; 0: three quarters of it
   /// Number of decoded blocks of 4^3 voxels that are kept, 8 and more. 0: as many as memory_budget
   /// allows, or without a budget as many as frames need.
@@ -28,8 +27,7 @@ struct RendererOptions {
   bool with_levels = false;       ///< frames may use levels of detail
   bool with_bounds = false;       ///< frames may ask for bounds and max_surface_error
   bool with_time_budget = false;  ///< frames may have a time budget
-  /// frames may have ambient rays and adaptive samples, and cast_rays() may be called
-  bool with_rays = false;
+  bool with_rays = false;         ///< frames may have ambient rays, and cast_rays() may be called
 };
 
 /// Turns requests into pictures of one volume. The constructor makes a renderer that draws on a

@@ -19,8 +19,7 @@ class Image:
     """A picture, and what it shows. Arrays that were not asked for are None.
 
     Rows go from top to bottom. If each pixel has several rays, depth, normals, position and bounds
-    have `samples` times as many rows and columns: one entry for each ray. With `adaptive`, they are
-    those of each pixel's first ray.
+    have `samples` times as many rows and columns: one entry for each ray.
     """
 
     rgb: npt.NDArray[np.uint8] | None  #: (height, width, 3)
@@ -47,7 +46,7 @@ class Image:
         self.statistics: dict[str, Any] = frame["statistics"]
         self.camera = request.camera
         self.isovalue = request.isovalue
-        self._samples = request.first_samples
+        self._samples = request.samples
         self._background = WHITE if request.background is None else request.background
 
     @property

@@ -102,8 +102,7 @@ class Renderer:
         budget allows, or without a budget as many as frames need.
     levels, bounds, time_budget, rays
         Whether frames may use levels of detail; ask for `max_error` and bounds; have a
-        `time_budget`; have `ambient` rays or be `adaptive`, and cast_rays() may be called. On the
-        host they may.
+        `time_budget`; have `ambient` rays, and cast_rays() may be called. On the host they may.
     profiling
         Measures a device's stages, for statistics["stage_ms"]. The host then waits for each pass.
     quick
@@ -199,7 +198,6 @@ class Renderer:
         voxel_error: float = 0.0,
         time_budget: float | None = None,
         ambient: int = 0,
-        adaptive: bool = False,
         on_pass: Callable[[Progress], bool | None] | None = None,
     ) -> Image:
         """Draws a frame. Decoded blocks are kept for the next frame.
@@ -235,9 +233,6 @@ class Renderer:
         ambient
             Rays from each hit, up to 255, that find out how much of the sky it sees. 16 and more
             look smooth. Each takes about as long as a frame without any. Needs rays=True.
-        adaptive
-            Casts one ray per pixel, and those of `samples` only where neighbours differ. Not with
-            ambient, voxel_pixels, max_error, time_budget. Needs rays=True.
         on_pass
             Called after each pass with the picture so far. If it returns False, the frame stops.
 

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from isowave import _core
 from isowave._camera import Camera, vector
-from isowave._checked import flag, function, names, number, numbers, refuse, size_of, whole
+from isowave._checked import function, names, number, numbers, refuse, size_of, whole
 
 Color = str | Sequence[float]  # "#rrggbb", or red, green, blue from 0 to 1
 ALL_OUTPUTS = ("rgb", "depth", "normals", "position")
@@ -65,7 +65,6 @@ class Request:
     voxel_error: float = 0.0
     time_budget: float | None = None
     ambient: int = 0
-    adaptive: bool = False
     on_pass: Callable[[Progress], bool | None] | None = None
 
     def __post_init__(self) -> None:
@@ -89,7 +88,6 @@ class Request:
             "voxel_error": number("voxel_error", self.voxel_error),
             "time_budget": optional("time_budget", self.time_budget),
             "ambient": whole("ambient", self.ambient),
-            "adaptive": flag("adaptive", self.adaptive),
             "on_pass": function("on_pass", self.on_pass),
         }
         for name, value in checked.items():
@@ -107,17 +105,9 @@ class Request:
                 by_sample or self.voxel_pixels > 0,
             ),
             "time_budget": ("time_budget", self.time_budget is not None),
-            "rays": (
-                "adaptive" if self.adaptive else "ambient",
-                self.adaptive or self.ambient != 0,
-            ),
+            "rays": ("ambient", self.ambient != 0),
         }
         return {option: argument for option, (argument, is_asked) in asked.items() if is_asked}
-
-    @property
-    def first_samples(self) -> int:
-        """Rays of each pixel along each axis that depth, normals and positions are of."""
-        return 1 if self.adaptive else self.samples
 
     def for_core(self) -> dict[str, Any]:
         """The request as fields of isowave::FrameRequest. Needs a camera and a size."""
@@ -141,7 +131,6 @@ class Request:
             "by": self.by,
             "time_budget_ms": None if self.time_budget is None else 1000 * self.time_budget,
             "ambient_rays": self.ambient,
-            "adaptive": self.adaptive,
             "want_picture": "rgb" in self.outputs,
             "want_depth": "depth" in self.outputs,
             "want_normals": "normals" in self.outputs,

@@ -146,8 +146,8 @@ class Volume(Voxels):
         wanted: dict[str, Any] = {"device": device, "memory_budget": memory_budget}
         wanted |= {"size": request.size, **dict.fromkeys(request.needs, True)}
         wanted["levels"] = not {"levels", "bounds", "time_budget"}.isdisjoint(request.needs)
-        if request.first_samples != 1:
-            wanted["samples"] = request.first_samples
+        if request.samples != 1:
+            wanted["samples"] = request.samples
         with self._lock:
             return self._renderer_for(wanted).draw(request)
 

@@ -220,26 +220,6 @@ def test_ambient_rays_darken_what_sees_little_of_the_sky():
         renderer.render(9, ambient=256)
 
 
-def test_adaptive_samples_draw_silhouettes_as_samples_do(volume):
-    camera = volume.camera(6, size=SIZE)
-    one, all_rays, adaptive = (
-        volume.render(6, size=SIZE, camera=camera, device="host", **more)
-        for more in ({}, {"samples": 4}, {"samples": 4, "adaptive": True})
-    )
-    assert np.array_equal(adaptive.depth, one.depth), "depth is of the first rays"
-    is_refined = (adaptive.rgb != one.rgb).any(axis=-1)
-    assert 10 < is_refined.sum() < adaptive.statistics["refined_pixels"] < SIZE[0] * SIZE[1] / 2
-    assert np.array_equal(adaptive.rgb[is_refined], all_rays.rgb[is_refined])
-    assert adaptive.rgba.shape == (*one.rgb.shape[:2], 4)
-    renderer = volume.renderer(device="cpu", size=SIZE, rays=True)
-    on_device = renderer.render(6, camera=camera, samples=4, adaptive=True)
-    assert np.array_equal(on_device.rgb, adaptive.rgb)
-    with pytest.raises(isowave.Error, match="give samples from 2 on"):
-        renderer.render(6, adaptive=True)
-    with pytest.raises(isowave.Error, match="adaptive needs a renderer that was made with rays=T"):
-        volume.renderer(device="cpu", size=SIZE).render(6, samples=2, adaptive=True)
-
-
 def test_device_and_host_draw_the_same_bits(volume):
     said = volume.verify(6, size=SIZE)
     assert said["equal"] and said["hits"] > 100

@@ -38,7 +38,6 @@ def test_arguments_reach_the_request_by_their_names(monkeypatch: pytest.MonkeyPa
         "voxel_error": 3.0,
         "time_budget": 4.0,
         "ambient": 5,
-        "adaptive": True,
         "on_pass": print,
     }
     assert [*given] == [field.name for field in dataclasses.fields(Request)][1:]
@@ -64,7 +63,6 @@ def test_arguments_reach_the_request_by_their_names(monkeypatch: pytest.MonkeyPa
         "by": "sample",
         "time_budget_ms": 4000,
         "ambient_rays": 5,
-        "adaptive": True,
         "want_picture": True,
         "want_depth": False,
         "want_normals": False,
@@ -106,7 +104,6 @@ def test_values_are_python_s_own() -> None:
         ("voxel_error", True, "voxel_error=True: give a number"),
         ("time_budget", "1 s", "time_budget='1 s': give a number"),
         ("ambient", -1, "ambient=-1: give a whole number from 0 to 4294967295"),
-        ("adaptive", 1, "adaptive=1: give True or False"),
         ("on_pass", 1, "on_pass=1: give a function"),
     ],
 )
@@ -127,7 +124,6 @@ def test_an_argument_of_another_kind_is_named(argument: str, value: Any, says: s
         ({"voxel_pixels": 1.0}, {"levels": "voxel_pixels"}),
         ({"time_budget": 1.0}, {"time_budget": "time_budget"}),
         ({"ambient": 1}, {"rays": "ambient"}),
-        ({"adaptive": True, "samples": 2}, {"rays": "adaptive"}),
     ],
 )
 def test_it_says_what_its_renderer_must_be_made_with(
