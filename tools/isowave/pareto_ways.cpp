@@ -35,7 +35,7 @@ std::vector<ParetoWay> make_ways() {
                     .voxel_pixels = 1});
   }
   ways.push_back({.name = "--voxel-error 4 %", .voxel_error = 0.04});
-  for (const double error : {0.5, 2.0}) {
+  for (const double error : {0.5, 1.0, 2.0}) {
     ways.push_back(
         {.name = fmt::format("--max-surface-error {}", error), .max_surface_error = error});
     ways.push_back({.name = fmt::format("--max-surface-error {} --by sample", error),
