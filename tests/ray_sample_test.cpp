@@ -337,6 +337,41 @@ TEST(RaySample, PromiseHoldsInRandomScenes) {
   RecordProperty("coarse", num_coarse);
 }
 
+/// All views of a series have the detail that is chosen once, for all of them.
+TEST(RaySample, SeriesHaveOneDetail) {
+  const CompressedVolume volume =
+      levels_of_field({64, 60, 56}, test::gyroid_field(40), {.tolerance = 0.01});
+  HostRenderer renderer(volume);
+  BoundedRenderer bounded(renderer, volume, volume.rate());
+  Camera near = orbit_cameras(volume.info, 1)[0], far = near;
+  near.eye -= 0.3 * (near.eye - near.at);
+  far.eye += 2.5 * (far.eye - far.at);
+  for (const Evidence by : {Evidence::kSample, Evidence::kProof}) {
+    FrameRequest request = request_by_sample(near, {320, 240}, 0.3f, 2);
+    request.by = by;
+    const Detail of_near = bounded.render(request).detail->detail;
+    const Detail of_far = bounded.render(seen_from(far, request)).detail->detail;
+    ASSERT_NE(of_near, of_far);
+    request.series = {near, far};
+    const DetailChoice first = bounded.render(request).detail.value(),
+                       second = bounded.render(seen_from(far, request)).detail.value();
+    EXPECT_EQ(first.detail, second.detail);
+    EXPECT_GT(first.total_ms, 0);
+    EXPECT_EQ(second.total_ms, 0) << "chosen for the first view";
+    // The order of requests does not matter, nor what was drawn before.
+    BoundedRenderer other(renderer, volume, volume.rate());
+    EXPECT_EQ(other.render(seen_from(far, request)).detail->detail, first.detail);
+    request.isovalue = 0.1f;
+    EXPECT_GT(bounded.render(request).detail->total_ms, 0) << "another isovalue";
+    request.series = {near};
+    request.isovalue = 0.3f;
+    EXPECT_EQ(bounded.render(request).detail->detail, of_near);
+    request.max_surface_error.reset();
+    request.by = Evidence::kProof;
+    EXPECT_THAT([&] { bounded.render(request); }, ThrowsMessage<Error>(HasSubstr("series")));
+  }
+}
+
 TEST(RaySample, NeedsNoErrors) {
   const CompressedVolume volume = levels_of_field({64, 60, 56}, test::gyroid_field(40));
   HostRenderer renderer(volume);

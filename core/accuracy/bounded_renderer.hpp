@@ -28,19 +28,47 @@ class BoundedRenderer : public RendererAround {
   FrameStats render(const FrameRequest &request) override {
     if (!request.max_surface_error) return inner().render(request);
     check(request, abilities());
-    FrameRequest chosen = request;
-    chosen.max_surface_error.reset();
-    chosen.by = Evidence::kProof;
-    DetailChoice choice =
-        choose_detail(inner(), volume_, rate_, chosen, *request.max_surface_error, request.by);
+    FrameRequest chosen = without_error(request);
+    const DetailChoice choice = choice_for(request, chosen);
     FrameStats stats = inner().render(with_detail(std::move(chosen), choice.detail));
-    stats.detail = std::move(choice);
+    stats.detail = choice;
     return stats;
   }
 
  private:
+  /// Requests that share a choice.
+  struct SeriesKey {
+    std::vector<Camera> series;
+    float isovalue;
+    ImageSize size;
+    double error;
+    Evidence by;
+    friend bool operator==(const SeriesKey &, const SeriesKey &) = default;
+  };
+
+  /// chosen: the request without an error
+  DetailChoice choice_for(const FrameRequest &request, const FrameRequest &chosen) {
+    const double error = *request.max_surface_error;
+    const auto choose = [&] {
+      return choose_detail(inner(), volume_, rate_, chosen, error, request.by, request.series);
+    };
+    if (request.series.empty()) return choose();
+    const SeriesKey key{request.series, request.isovalue, size_of(request, abilities()), error,
+                        request.by};
+    if (key == of_series_) {
+      choice_.total_ms = 0;
+    } else {
+      of_series_.reset();
+      choice_ = choose();
+      of_series_ = key;
+    }
+    return choice_;
+  }
+
   const CompressedVolume &volume_;
   double rate_;
+  std::optional<SeriesKey> of_series_{};  ///< that choice_ was made for
+  DetailChoice choice_{};
 };
 
 }  // namespace isowave::core

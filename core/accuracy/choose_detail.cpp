@@ -39,10 +39,17 @@ std::vector<double> voxel_errors(const CompressedVolume &volume, double error) {
   return errors;
 }
 
-/// Blocks that frames of levels of detail decode for these hits, against those of the finest level
-/// alone: a pixel covers blocks by the square of its distance, and of each level a quarter as many.
-double blocks_share(std::span<const float> depth, std::span<const FrameParams> frames) {
+/// Blocks that frames decode for some hits, in units that do not matter: with levels of detail, and
+/// of the finest level alone.
+struct Blocks {
   double with_levels = 0, finest = 0;
+
+  double share() const { return finest == 0 ? 1.0 : with_levels / finest; }
+};
+
+/// Adds a frame's: a pixel covers blocks by the square of its distance, and of each level a quarter
+/// as many.
+void add_blocks(std::span<const float> depth, std::span<const FrameParams> frames, Blocks &sum) {
   for (const float t : depth) {
     if (std::isinf(t)) continue;
     int level = 0;
@@ -51,10 +58,21 @@ double blocks_share(std::span<const float> depth, std::span<const FrameParams> f
         level = static_cast<int>(i);
     }
     const double blocks = double{t} * double{t};
-    finest += blocks;
-    with_levels += std::ldexp(blocks, -2 * level);
+    sum.finest += blocks;
+    sum.with_levels += std::ldexp(blocks, -2 * level);
   }
-  return finest == 0 ? 1.0 : with_levels / finest;
+}
+
+/// At most so many views of a series are looked at.
+constexpr std::size_t kSeriesViews = 4;
+/// The views that detail is chosen for, spread evenly over a series.
+std::vector<Camera> views_of(const FrameRequest &request, std::span<const Camera> series) {
+  if (series.empty()) return {request.camera};
+  std::vector<Camera> views;
+  const std::size_t num_views = std::min(series.size(), kSeriesViews);
+  for (std::size_t i = 0; i < num_views; ++i)
+    views.push_back(series[i * series.size() / num_views]);
+  return views;
 }
 
 /// An error of at least so much can be kept in any volume of these values: 2^-24 of the next power
@@ -97,15 +115,17 @@ void advise(const CompressedVolume &volume, double error, double max_surface_err
   }
 }
 
-/// Draws a sample of a frame's rays with one detail after another, and judges each.
+/// Draws a sample of the rays of some views with one detail after another, and judges each.
 class Judge {
  public:
   /// Draws the sample at full detail.
   Judge(Renderer &renderer, const CompressedVolume &volume, const FrameRequest &request,
-        double max_surface_error, Evidence by)
+        double max_surface_error, Evidence by, std::span<const Camera> series)
       : renderer_(renderer),
         volume_(volume),
         request_(request),
+        views_(views_of(request, series)),
+        levels_(renderer.levels()),
         size_(sample_of(size_of(request, renderer.abilities()))),
         max_surface_error_(max_surface_error),
         by_(by) {
@@ -113,7 +133,7 @@ class Judge {
     request_.ambient_rays = 0;
     request_.size = size_;
     request_.on_pass = {};
-    const View view = make_view(renderer.levels().front(), request.camera, size_);
+    const View view = make_view(levels_.front(), request.camera, size_);
     for (std::uint32_t ray = 0; ray < size_.num_rays(); ++ray) {
       if (!is_in_picture(view, size_, ray)) beside_.push_back(ray);
     }
@@ -128,8 +148,15 @@ class Judge {
 
   double best() const { return best_; }  ///< share of the pixels, at full detail
   double median() const { return median_; }
-  const std::vector<float> &finest_depth() const {
-    return finest_.empty() ? finest_depth_ : finest_.front().depth;
+  /// Blocks with levels so coarse, as the sample's hits tell.
+  Blocks blocks(double voxel_pixels) const {
+    Blocks blocks;
+    for (std::size_t i = 0; i < views_.size(); ++i) {
+      add_blocks(finest_depth_[i],
+                 make_level_frames(levels_, views_[i], size_, request_.isovalue, voxel_pixels),
+                 blocks);
+    }
+    return blocks;
   }
   const std::vector<DetailChoice::Try> &tries() const { return tries_; }
   /// A sample with a detail that was tried.
@@ -143,40 +170,45 @@ class Judge {
  private:
   double kept_with(const Detail &detail) {
     const FrameRequest request = with_detail(request_, detail);
-    double kept;
-    if (by_ == Evidence::kSample) {
-      kept = sampled(request);
-    } else {
-      renderer_.render(request);
-      kept = certified(request, renderer_.depth());
-    }
-    tries_.push_back({detail, kept});
-    return kept;
+    tries_.push_back({detail, by_ == Evidence::kSample ? sampled(request) : certified(request)});
+    return tries_.back().kept;
   }
 
   double sampled(const FrameRequest &request) {
-    std::vector<SeenFrame> seen;
-    for (const Camera &camera : cameras_beside(request.camera, size_.height, max_surface_error_)) {
-      renderer_.render(seen_from(camera, request));
-      seen.push_back(seen_frame(renderer_));
+    SampledShare own;
+    const bool is_first = finest_.empty();
+    for (std::size_t i = 0; i < views_.size(); ++i) {
+      std::vector<SeenFrame> seen;
+      for (const Camera &camera : cameras_beside(views_[i], size_.height, max_surface_error_)) {
+        renderer_.render(seen_from(camera, request));
+        seen.push_back(seen_frame(renderer_));
+      }
+      leave_out_beside(seen.front().depth, INFINITY);
+      if (is_first) {
+        finest_depth_.push_back(seen.front().depth);
+        finest_.push_back(seen);
+      }
+      own += compare_hits(views_[i], size_, finest_[i], seen, max_surface_error_);
     }
-    leave_out_beside(seen.front().depth, INFINITY);
-    if (finest_.empty()) finest_ = seen;
-    const SampledShare own = compare_hits(request.camera, size_, finest_, seen, max_surface_error_);
     samples_.push_back(of_first(renderer_.team(), std::vector{own}).front());
     return samples_.back().share();
   }
 
-  double certified(const FrameRequest &request, std::vector<float> depth) {
-    std::vector<float> bounds = certify(renderer_, volume_, request, depth).bounds;
-    leave_out_beside(bounds, 0);
-    leave_out_beside(depth, INFINITY);
+  double certified(const FrameRequest &request) {
+    std::vector<float> bounds;  // of all views
+    for (const Camera &camera : views_) {
+      const FrameRequest view = seen_from(camera, request);
+      renderer_.render(view);
+      std::vector<float> depth = renderer_.depth();
+      std::vector<float> of_view = certify(renderer_, volume_, view, depth).bounds;
+      leave_out_beside(of_view, 0);
+      leave_out_beside(depth, INFINITY);
+      bounds.insert(bounds.end(), of_view.begin(), of_view.end());
+      if (finest_depth_.size() < views_.size()) finest_depth_.push_back(std::move(depth));
+    }
     const CertificateSummary summary =
         of_first(renderer_.team(), std::vector{summarize(bounds, max_surface_error_)}).front();
-    if (tries_.empty()) {
-      finest_depth_ = std::move(depth);
-      median_ = summary.median;
-    }
+    if (tries_.empty()) median_ = summary.median;
     return summary.num_pixels == 0 ? 1.0
                                    : double(summary.num_certified) / double(summary.num_pixels);
   }
@@ -190,12 +222,15 @@ class Judge {
   Renderer &renderer_;
   const CompressedVolume &volume_;
   FrameRequest request_;
+  std::vector<Camera> views_;
+  std::vector<VolumeInfo> levels_;
   ImageSize size_;
   double max_surface_error_;
   Evidence by_;
   std::vector<std::uint32_t> beside_;  ///< rays of the sample beside the picture
-  std::vector<float> finest_depth_;    ///< by proof
-  std::vector<SeenFrame> finest_;      ///< by sample
+  // At full detail, of each view.
+  std::vector<std::vector<float>> finest_depth_;
+  std::vector<std::vector<SeenFrame>> finest_;  ///< by sample
   std::vector<DetailChoice::Try> tries_;
   std::vector<SampledShare> samples_;  ///< by sample: of each try
   double best_ = 0, median_ = 0;
@@ -204,7 +239,8 @@ class Judge {
 }  // namespace
 
 DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, double rate,
-                           const FrameRequest &request, double max_surface_error, Evidence by) {
+                           const FrameRequest &request, double max_surface_error, Evidence by,
+                           std::span<const Camera> series) {
   check_max_surface_error(max_surface_error);
   const auto begin = std::chrono::steady_clock::now();
   Team &team = renderer.team();
@@ -214,7 +250,7 @@ DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, d
   const bool by_sample = by == Evidence::kSample;
   // By proof, certify() throws if neither is known.
   const double error = known_voxel_error(volume).value_or(double{largest_bound(volume.bounds)});
-  Judge judge(renderer, volume, request, max_surface_error, by);
+  Judge judge(renderer, volume, request, max_surface_error, by, series);
   DetailChoice choice;
   choice.median = judge.median();
   choice.reachable = judge.best() >= 0.5;
@@ -233,10 +269,7 @@ DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, d
     const double coarsest = first_to_suffice(all_voxel_pixels(), [](double voxel_pixels) {
       return Detail{voxel_pixels, 0};
     });
-    const std::vector<FrameParams> level_frames = make_level_frames(
-        levels, request.camera, size_of(request, abilities), request.isovalue, coarsest);
-    const double share =
-        of_first(team, std::vector{blocks_share(judge.finest_depth(), level_frames)}).front();
+    const double share = of_first(team, std::vector{judge.blocks(coarsest).share()}).front();
     if (share <= kMaxBlocksShare) choice.detail.voxel_pixels = coarsest;
   }
   if (choice.reachable && abilities.fewer_planes && rate > kMinPlaneRate &&

@@ -27,6 +27,7 @@ inline constexpr double kMinPlaneRate = 16;
 /// rate               rate of the whole volume [bits per voxel]
 /// request            the frame's request; its voxel_pixels and voxel_error do not matter
 /// max_surface_error  error that most pixels are to keep [pixels], above 0
+/// series             see FrameRequest::series; up to four of its views are looked at
 ///
 /// Draws a sample of the frame's rays (ray_sample.hpp). So the choice depends on data, camera and
 /// size, never on timings. Picks the coarsest levels of detail, then the fewest bit planes:
@@ -41,7 +42,7 @@ inline constexpr double kMinPlaneRate = 16;
 /// Error as certify() does, by proof.
 DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, double rate,
                            const FrameRequest &request, double max_surface_error,
-                           Evidence by = Evidence::kProof);
+                           Evidence by = Evidence::kProof, std::span<const Camera> series = {});
 /// The same with a renderer of the whole volume.
 inline DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume,
                                   const FrameRequest &request, double max_surface_error,

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <type_traits>
 
@@ -51,6 +52,11 @@ core::ImageSize core_size(const ImageSize &size) {
   return {size.width, size.height, size.samples};
 }
 
+core::Camera core_camera(const Camera &camera) {
+  return {to_glm(camera.eye), to_glm(camera.at), to_glm(camera.up), camera.fovy_degrees,
+          camera.parallel_height};
+}
+
 Camera public_camera(const core::Camera &camera) {
   return {from_glm(camera.eye), from_glm(camera.at), from_glm(camera.up), camera.fovy_deg,
           camera.parallel_height};
@@ -63,9 +69,7 @@ core::Appearance core_appearance(const Appearance &appearance) {
 
 core::FrameRequest core_request(const FrameRequest &request, const core::CompressedVolume &volume) {
   core::FrameRequest result;
-  const Camera &camera = request.camera;
-  result.camera = {to_glm(camera.eye), to_glm(camera.at), to_glm(camera.up), camera.fovy_degrees,
-                   camera.parallel_height};
+  result.camera = core_camera(request.camera);
   result.isovalue = core::drawn_isovalue(volume, request.isovalue);
   result.size = core_size(request.size);
   result.voxel_pixels = request.voxel_pixels;
@@ -78,6 +82,7 @@ core::FrameRequest core_request(const FrameRequest &request, const core::Compres
   if (request.want_picture || request.on_pass) result.ambient_rays = request.ambient_rays;
   result.max_surface_error = request.max_surface_error;
   result.by = static_cast<core::Evidence>(request.by);
+  std::ranges::transform(request.series, std::back_inserter(result.series), core_camera);
   result.time_budget_ms = request.time_budget_ms;
   return result;
 }
@@ -117,7 +122,7 @@ std::string text_of(const FrameRequest &request) {
       text += fmt::format("{} ", value);
     }
   };
-  for_each_field(request, [&]<class Field>(const char *, const Field &field) {
+  const auto visit = [&]<class Field>(const char *, const Field &field) {
     if constexpr (requires { field.has_value(); }) {
       add(field.has_value());
       add(field.value_or(0));
@@ -125,6 +130,14 @@ std::string text_of(const FrameRequest &request) {
       for (const auto &value : field) add(value);
     } else {
       add(field);
+    }
+  };
+  for_each_field(request, [&]<class Field>(const char *name, const Field &field) {
+    if constexpr (std::is_same_v<Field, std::vector<Camera>>) {
+      add(field.size());
+      for (const Camera &camera : field) for_each_camera_field(camera, visit);
+    } else {
+      visit(name, field);
     }
   });
   return text;

@@ -88,9 +88,7 @@ Frame Renderer::Implementation::draw(const FrameRequest &request) {
   note_memory();
   wanted.on_pass = {};
   if (stats.detail) {
-    wanted = core::with_detail(wanted, stats.detail->detail);
-    wanted.max_surface_error.reset();
-    wanted.by = core::Evidence::kProof;
+    wanted = with_detail(without_error(std::move(wanted)), stats.detail->detail);
     if (team.rank() == 0) frame.detail = public_choice(*stats.detail);
   }
   fetch(request, frame);

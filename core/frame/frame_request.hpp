@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <vector>
 
 #include "core/frame/frame_stats.hpp"
 #include "core/frame/normals.hpp"
@@ -51,6 +52,9 @@ struct FrameRequest {
   /// sample that of full detail.
   std::optional<double> max_surface_error{};
   Evidence by = Evidence::kProof;  ///< for max_surface_error; kProof without one
+  /// With max_surface_error: views of which most pixels are to keep it together, so that all of
+  /// them are drawn with the same detail, which is chosen once. Empty: this view alone.
+  std::vector<Camera> series{};
   /// Time in which the largest picture possible is drawn, small pictures first.
   std::optional<double> time_budget_ms{};
   OnPass on_pass{};
@@ -65,6 +69,14 @@ inline FrameRequest seen_from(const Camera &camera, FrameRequest request) {
 /// The same request with a time budget [ms].
 inline FrameRequest within_ms(double time_budget_ms, FrameRequest request) {
   request.time_budget_ms = time_budget_ms;
+  return request;
+}
+
+/// The request without a largest error.
+inline FrameRequest without_error(FrameRequest request) {
+  request.max_surface_error.reset();
+  request.by = Evidence::kProof;
+  request.series.clear();
   return request;
 }
 

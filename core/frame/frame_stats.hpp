@@ -73,6 +73,12 @@ struct SampledShare {
   /// Lower end of the confidence interval of num_within / num_hits: see lowest_share().
   double lowest = 0;
 
+  SampledShare &operator+=(const SampledShare &other) {
+    num_rays += other.num_rays;
+    num_hits += other.num_hits;
+    num_within += other.num_within;
+    return *this;
+  }
   double share() const { return num_hits == 0 ? 1.0 : double(num_within) / double(num_hits); }
 };
 

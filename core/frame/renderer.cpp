@@ -16,6 +16,8 @@ void check_choices(const FrameRequest &request) {
   if (!request.max_surface_error) {
     if (request.by == Evidence::kSample)
       throw Error("a sample is evidence for max_surface_error: give max_surface_error");
+    if (!request.series.empty())
+      throw Error("a series of views shares max_surface_error: give max_surface_error");
     return;
   }
   if (request.time_budget_ms)

@@ -25,6 +25,7 @@ struct ImageSize {
   std::uint32_t ray_columns() const { return in_sample(width * samples); }
   std::uint32_t ray_rows() const { return in_sample(height * samples); }
   std::uint64_t num_rays() const { return std::uint64_t(ray_columns()) * ray_rows(); }
+  friend bool operator==(const ImageSize &, const ImageSize &) = default;
 
  private:
   /// The squares' middle is the picture's, so both are odd or even numbers of rays wide.

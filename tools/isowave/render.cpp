@@ -219,6 +219,8 @@ isowave::FrameRequest FrameOfMany::request() const {
   request.ambient_rays = options.ambient_rays;
   request.max_surface_error = options.max_surface_error;
   if (options.by == "sample") request.by = isowave::Evidence::kSample;
+  if (options.max_surface_error && drawing.cameras.size() > 1)
+    std::ranges::transform(drawing.cameras, std::back_inserter(request.series), public_camera);
   request.time_budget_ms = options.time_budget;
   request.want_picture = !options.image.empty();
   request.want_depth = !options.depth.empty();

@@ -53,21 +53,27 @@ nlohmann::ordered_json report_steps(const FrameStats &stats, double budget_ms) {
   return {{"budget_ms", budget_ms}, {"complete", stats.complete}, {"steps", steps}};
 }
 
+/// When the detail was chosen, for the report.
+std::string chosen_in(const DetailChoice &choice) {
+  return choice.total_ms == 0 ? "chosen for all views"
+                              : fmt::format("chosen in {:.0f} ms", choice.total_ms);
+}
+
 nlohmann::ordered_json report_sample(double max_surface_error, const DetailChoice &choice) {
   const SampledShare &sample = choice.sample.value();
   if (choice.detail == Detail{}) {
     fmt::print(
         "  full detail: the sample does not show that less would keep {} pixels and save many "
-        "blocks; chosen in {:.0f} ms\n",
-        max_surface_error, choice.total_ms);
+        "blocks; {}\n",
+        max_surface_error, chosen_in(choice));
   } else {
     fmt::print(
         "  within {} pixels of the surface at full detail: {:.2f} % of {} hits of {} sampled rays\n"
         "  at least {:.2f} % of all hits, with {:.0f} % confidence (Clopper-Pearson)\n"
-        "  with voxels up to {:.3g} pixels apart and values up to {} off; chosen in {:.0f} ms\n",
+        "  with voxels up to {:.3g} pixels apart and values up to {} off; {}\n",
         max_surface_error, 100 * sample.share(), with_commas(sample.num_hits),
         with_commas(sample.num_rays), 100 * sample.lowest, 100 * kConfidence,
-        choice.detail.voxel_pixels, choice.detail.voxel_error, choice.total_ms);
+        choice.detail.voxel_pixels, choice.detail.voxel_error, chosen_in(choice));
   }
   return {{"max_surface_error", max_surface_error}, {"by", "sample"},
           {"chosen", detail_json(choice.detail)},   {"tries", tries_json(choice, "within")},
@@ -88,13 +94,13 @@ nlohmann::ordered_json report_error(double max_surface_error, const CompressedVo
   fmt::print(
       "  within {} pixels of the true surface{}: {:.2f} % of {} rays (bound: median {:.3g}, p99 "
       "{:.3g}); {} uncertain\n"
-      "  with voxels up to {:.3g} pixels apart and values up to {} off; chosen in {:.0f} ms, "
+      "  with voxels up to {:.3g} pixels apart and values up to {} off; {}, "
       "bounded in {:.0f} ms\n",
       max_surface_error,
       volume.errors_are_stated ? ", if the errors are right that the file states" : "", certified,
       with_commas(summary.num_pixels), summary.median, summary.p99,
       with_commas(summary.num_uncertain), choice.detail.voxel_pixels, choice.detail.voxel_error,
-      choice.total_ms, certificate.total_ms);
+      chosen_in(choice), certificate.total_ms);
   if (!choice.reachable) {
     warn(fmt::format("most pixels cannot be kept within {} pixels: {}", max_surface_error,
                      choice.advice));

@@ -170,6 +170,11 @@ isowave::FrameRequest request_of(const nb::dict &options) {
       std::string text = "proof";
       get(name, text);
       field = evidence_of(text);
+    } else if constexpr (std::is_same_v<Field, std::vector<isowave::Camera>>) {
+      std::vector<nb::dict> cameras;
+      get(name, cameras);
+      for (const nb::dict &camera : cameras)
+        for_each_camera_field(field.emplace_back(), reader_of(camera));
     } else if constexpr (!std::is_enum_v<Field>) {
       get(name, field);
     }

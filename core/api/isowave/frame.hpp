@@ -88,6 +88,10 @@ struct FrameRequest {
   /// the error (DetailChoice::sample); to choose levels of detail, needs with_levels.
   std::optional<double> max_surface_error{};
   Evidence by = Evidence::kProof;  ///< for max_surface_error; kProof without one
+  /// With max_surface_error: views of which most pixels are to keep it together. All requests with
+  /// the same series and error are drawn with the same detail, which is chosen for the first of
+  /// them. Empty: the request's view alone.
+  std::vector<Camera> series{};
   /// Time in which the largest picture possible is drawn, small pictures first. Needs
   /// with_time_budget.
   std::optional<double> time_budget_ms{};
@@ -113,17 +117,25 @@ struct Hit {
   std::array<float, 3> gradient{};  ///< as FrameRequest::normals [voxel value per voxel]
 };
 
+/// Calls visit(name, field) for each field of a camera.
+///
+/// camera  a Camera, or a const one
+template <class AnyCamera, class Visit>
+void for_each_camera_field(AnyCamera &camera, const Visit &visit) {
+  visit("eye", camera.eye);
+  visit("at", camera.at);
+  visit("up", camera.up);
+  visit("fovy_degrees", camera.fovy_degrees);
+  visit("parallel_height", camera.parallel_height);
+}
+
 /// Calls visit(name, field) for each field of a request, its camera and its appearance, except
 /// on_pass. The names are those of isowave's Python package.
 ///
 /// request  a FrameRequest, or a const one
 template <class Request, class Visit>
 void for_each_field(Request &request, const Visit &visit) {
-  visit("eye", request.camera.eye);
-  visit("at", request.camera.at);
-  visit("up", request.camera.up);
-  visit("fovy_degrees", request.camera.fovy_degrees);
-  visit("parallel_height", request.camera.parallel_height);
+  for_each_camera_field(request.camera, visit);
   visit("isovalue", request.isovalue);
   visit("width", request.size.width);
   visit("height", request.size.height);
@@ -141,6 +153,7 @@ void for_each_field(Request &request, const Visit &visit) {
   visit("ambient_rays", request.ambient_rays);
   visit("max_surface_error", request.max_surface_error);
   visit("by", request.by);
+  visit("series", request.series);
   visit("time_budget_ms", request.time_budget_ms);
   visit("want_picture", request.want_picture);
   visit("want_depth", request.want_depth);

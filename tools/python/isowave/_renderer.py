@@ -194,6 +194,7 @@ class Renderer:
         outputs: Sequence[str] = ALL_OUTPUTS,
         max_error: float | None = None,
         by: str = "proof",
+        series: Sequence[Camera] = (),
         voxel_pixels: float = 0.0,
         voxel_error: float = 0.0,
         time_budget: float | None = None,
@@ -224,6 +225,9 @@ class Renderer:
             "proof" of max_error, against the volume before compression, which needs bounds=True; or
             "sample": 99 % of the hits keep it, against full detail, as some rays show. Needs
             levels=True; see statistics["detail"].
+        series
+            Views of which most hits are to keep max_error together, such as those of a movie: all
+            frames with the same series have the same detail, which is chosen once.
         voxel_pixels
             Largest distance between voxels of coarser levels [pixels]; 0: none. Needs levels=True.
         voxel_error

@@ -61,6 +61,7 @@ class Request:
     outputs: Sequence[str] = ALL_OUTPUTS
     max_error: float | None = None
     by: str = "proof"
+    series: Sequence[Camera] = ()
     voxel_pixels: float = 0.0
     voxel_error: float = 0.0
     time_budget: float | None = None
@@ -84,6 +85,7 @@ class Request:
             "outputs": outputs,
             "max_error": optional("max_error", self.max_error),
             "by": evidence_of(self.by),
+            "series": tuple(camera_of(camera) for camera in self.series),
             "voxel_pixels": number("voxel_pixels", self.voxel_pixels),
             "voxel_error": number("voxel_error", self.voxel_error),
             "time_budget": optional("time_budget", self.time_budget),
@@ -113,11 +115,7 @@ class Request:
         """The request as fields of isowave::FrameRequest. Needs a camera and a size."""
         assert self.camera is not None and self.size is not None
         return {
-            "eye": self.camera.eye,
-            "at": self.camera.at,
-            "up": self.camera.up,
-            "fovy_degrees": self.camera.fovy,
-            "parallel_height": self.camera.parallel_height,
+            **camera_for_core(self.camera),
             "isovalue": self.isovalue,
             "width": self.size[0],
             "height": self.size[1],
@@ -129,6 +127,7 @@ class Request:
             "voxel_error": self.voxel_error,
             "max_surface_error": self.max_error,
             "by": self.by,
+            "series": [camera_for_core(camera) for camera in self.series],
             "time_budget_ms": None if self.time_budget is None else 1000 * self.time_budget,
             "ambient_rays": self.ambient,
             "want_picture": "rgb" in self.outputs,
@@ -161,6 +160,17 @@ def camera_of(camera: Any) -> Camera:
         number("Camera.fovy", camera.fovy),
         optional("Camera.parallel_height", camera.parallel_height),
     )
+
+
+def camera_for_core(camera: Camera) -> dict[str, Any]:
+    """The camera as fields of isowave::Camera."""
+    return {
+        "eye": camera.eye,
+        "at": camera.at,
+        "up": camera.up,
+        "fovy_degrees": camera.fovy,
+        "parallel_height": camera.parallel_height,
+    }
 
 
 def normals_of(normals: str) -> str:
