@@ -7,7 +7,7 @@
 namespace isowave::core {
 
 /// Draws frames with a largest surface error (choose_detail()): by proof if the other renderer has
-/// bounds, by sample if hits name their cells. Other requests are handed on.
+/// bounds, by sample in any case. Other requests are handed on.
 class BoundedRenderer : public RendererAround {
  public:
   /// volume  that this process's renderer was made for; must outlive this
@@ -20,7 +20,7 @@ class BoundedRenderer : public RendererAround {
   Abilities abilities() const override {
     Abilities abilities = inner().abilities();
     abilities.surface_error = abilities.bounds;
-    abilities.sampled_error = abilities.cells;
+    abilities.sampled_error = true;
     return abilities;
   }
 

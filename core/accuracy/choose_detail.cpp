@@ -181,7 +181,7 @@ class Judge {
       std::vector<SeenFrame> seen;
       for (const Camera &camera : cameras_beside(views_[i], size_.height, max_surface_error_)) {
         renderer_.render(seen_from(camera, request));
-        seen.push_back(seen_frame(renderer_));
+        seen.push_back(seen_frame(renderer_, camera));
       }
       leave_out_beside(seen.front().depth, INFINITY);
       if (is_first) {

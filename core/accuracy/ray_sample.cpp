@@ -4,6 +4,8 @@
 #include <cmath>
 #include <glm/glm.hpp>
 
+#include "kernels_cl/portable/grid_dda.h"
+
 namespace isowave::core {
 
 namespace {
@@ -27,7 +29,6 @@ double probability(std::uint64_t num_beyond, std::uint64_t num_hits, double shar
 /// error  [world units]
 bool is_near(const SeenFrame &frame, std::span<const SeenFrame> shown, std::size_t ray,
              double error) {
-  const auto vector_of = [](const auto &v) { return glm::dvec3(v[0], v[1], v[2]); };
   const double t = double{frame.depth[ray]};
   double least = INFINITY, largest = -INFINITY;
   for (const SeenFrame &beside : shown) {
@@ -35,8 +36,9 @@ bool is_near(const SeenFrame &frame, std::span<const SeenFrame> shown, std::size
     if (std::isinf(seen)) continue;
     least = std::min(least, seen);
     largest = std::max(largest, seen);
-    const glm::dvec3 apart = vector_of(frame.positions[ray]) - vector_of(beside.positions[ray]),
-                     normal = vector_of(beside.normals[ray]);
+    const std::array<float, 3> &of_hit = beside.normals[ray];
+    const glm::dvec3 apart = frame.positions[ray] - beside.positions[ray],
+                     normal(of_hit[0], of_hit[1], of_hit[2]);
     if (glm::length(apart) <= kGrazing * error && glm::length(normal) > 0.5 &&
         std::abs(glm::dot(apart, normal)) <= error)
       return true;
@@ -52,10 +54,21 @@ ImageSize sample_of(ImageSize size) {
   return size;
 }
 
-SeenFrame seen_frame(Renderer &renderer) {
-  const FrameArrays arrays =
-      renderer.fetch({.depth = true, .normals = true, .positions = true}, {});
-  return {arrays.depth.copy(), arrays.normals.copy(), arrays.positions.copy()};
+SeenFrame seen_frame(Renderer &renderer, const Camera &camera) {
+  const FrameArrays arrays = renderer.fetch({.depth = true, .normals = true}, {});
+  SeenFrame frame{arrays.depth.copy(), arrays.normals.copy(), {}};
+  const ImageSize size = renderer.size();
+  const View view = make_view(renderer.levels().front(), camera, size);
+  const double pixels = 0.5 / size.samples;  // twice u and v count rays
+  frame.positions.resize(frame.depth.size());
+  for (std::size_t ray = 0; ray < frame.depth.size(); ++ray) {
+    if (std::isinf(frame.depth[ray])) continue;
+    const RayPlace place =
+        place_of_ray(&view, static_cast<int>(ray % view.width), static_cast<int>(ray / view.width));
+    const glm::dvec2 at(twice_u(&view, place.column), twice_v(&view, place.row));
+    frame.positions[ray] = point_of_ray(camera, pixels * at, size.height, double{frame.depth[ray]});
+  }
+  return frame;
 }
 
 std::vector<Camera> cameras_beside(const Camera &camera, std::uint32_t height, double pixels) {

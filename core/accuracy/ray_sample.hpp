@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdint>
+#include <glm/glm.hpp>
 #include <span>
 #include <vector>
 
@@ -23,13 +24,15 @@ ImageSize sample_of(ImageSize size);
 
 /// The hits of one frame's rays.
 struct SeenFrame {
-  std::vector<float> depth;                      ///< [num_rays] see HitRecord::t
-  std::vector<std::array<float, 3>> normals;     ///< [num_rays] see world_normal()
-  std::vector<std::array<double, 3>> positions;  ///< [num_rays] see hit_position()
+  std::vector<float> depth;                   ///< [num_rays] see HitRecord::t
+  std::vector<std::array<float, 3>> normals;  ///< [num_rays] see world_normal()
+  std::vector<glm::dvec3> positions;          ///< [num_rays] world space; without a hit: anything
 };
 
 /// The hits of the renderer's last frame; of a team's other ranks than 0: none.
-SeenFrame seen_frame(Renderer &renderer);
+///
+/// camera  of that frame
+SeenFrame seen_frame(Renderer &renderer, const Camera &camera);
 
 /// Cameras whose frames show what is at most so many pixels beside a camera's rays. The first one
 /// is the camera, the others' rays pass in eight directions, so many pixels away and half as many.

@@ -92,6 +92,14 @@ bool finite(const glm::dvec3 &v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
+/// A vector of so many pixels in the picture's plane.
+glm::dvec3 in_picture(const Camera &camera, const glm::dvec2 &pixels) {
+  const glm::dvec3 forward = camera.at - camera.eye,
+                   right = glm::normalize(glm::cross(forward, camera.up)),
+                   up = glm::normalize(glm::cross(right, forward));
+  return pixels.x * right + pixels.y * up;
+}
+
 }  // namespace
 
 void check_camera(const Camera &camera, std::string_view what) {
@@ -123,10 +131,7 @@ Camera turned(const Camera &camera, double degrees) {
 }
 
 Camera aside(const Camera &camera, const glm::dvec2 &pixels, std::uint32_t height) {
-  const glm::dvec3 forward = camera.at - camera.eye,
-                   right = glm::normalize(glm::cross(forward, camera.up)),
-                   up = glm::normalize(glm::cross(right, forward)),
-                   to = pixels.x * right + pixels.y * up;
+  const glm::dvec3 forward = camera.at - camera.eye, to = in_picture(camera, pixels);
   const double by = glm::length(to);
   Camera result = camera;
   if (by == 0) return result;
@@ -141,6 +146,14 @@ Camera aside(const Camera &camera, const glm::dvec2 &pixels, std::uint32_t heigh
   result.at = camera.eye + turn * forward;
   result.up = turn * camera.up;
   return result;
+}
+
+glm::dvec3 point_of_ray(const Camera &camera, const glm::dvec2 &pixels, std::uint32_t height,
+                        double distance) {
+  const glm::dvec3 forward = glm::normalize(camera.at - camera.eye),
+                   beside = in_picture(camera, pixels) * pixel_size_at(camera, height, 1);
+  if (camera.parallel_height) return camera.eye + beside + distance * forward;
+  return camera.eye + distance * glm::normalize(forward + beside);
 }
 
 Camera in_parallel(const Camera &camera) {

@@ -53,6 +53,14 @@ Camera in_parallel(const Camera &camera);
 /// height  of the picture [pixels]
 double pixel_size_at(const Camera &camera, std::uint32_t height, double distance);
 
+/// The point that a ray passes at a distance from the eye, or in parallel projection from its plane
+/// [world units].
+///
+/// pixels  from the middle of the picture, to the right and up
+/// height  of the picture [pixels]
+glm::dvec3 point_of_ray(const Camera &camera, const glm::dvec2 &pixels, std::uint32_t height,
+                        double distance);
+
 /// A view of a box from the front right and above, where orbit_cameras() begins, in which it fills
 /// the picture to `margin` of it.
 ///

@@ -226,7 +226,8 @@ void add_render_options(CLI::App &command, RenderArgs &options) {
       .add_option("--by", options.by,
                   "evidence for --max-surface-error. proof: bounds of each pixel's error. sample: "
                   "with 95 % confidence, 99 % of the rays that hit are so near to the surface at "
-                  "full detail, judged by some of them; needs no measured errors")
+                  "full detail, beside the ray or along it, judged by some of them; needs no "
+                  "measured errors")
       ->check(CLI::IsMember({"proof", "sample"}))
       ->capture_default_str();
   command.add_option(

@@ -84,8 +84,9 @@ struct FrameRequest {
   std::uint32_t ambient_rays = 0;
   /// Largest distance to the true surface [pixels]. voxel_pixels and voxel_error are then chosen so
   /// that most pixels keep it. By proof, the true surface is that of the volume before compression;
-  /// needs with_bounds. By sample, it is that of full detail, and 99 % of the rays that hit it keep
-  /// the error (DetailChoice::sample); to choose levels of detail, needs with_levels.
+  /// needs with_bounds. By sample, it is that of full detail, and 99 % of the rays that hit keep
+  /// the error, along the ray and beside it (DetailChoice::sample); to choose levels of detail,
+  /// needs with_levels.
   std::optional<double> max_surface_error{};
   Evidence by = Evidence::kProof;  ///< for max_surface_error; kProof without one
   /// With max_surface_error: views of which most pixels are to keep it together. All requests with
