@@ -84,7 +84,7 @@ TEST(Float8, FmaIsRoundedOnce) {
 TEST(Float8, RoundsLikeTheLibrary) {
   if (!__builtin_cpu_supports("sse4.1")) GTEST_SKIP() << "needs SSE4.1";
   const Floats x = {-2.5f, -1.5f, -0.5f, 0.5f, 1.5f, 2.5f, 3.25f, -3.75f};
-  const Floats floors = packets_of_test::floor(x), nearest = packets_of_test::rint(x),
+  const Floats floors = packets_of_test::floor(x), nearest = packets_of_test::to_nearest(x),
                roots = packets_of_test::sqrt(x * x);
   const auto is_small = x < 1.0f;
   const Floats picked = packets_of_test::pick(is_small, x, -x);

@@ -71,7 +71,7 @@ inline Floats floor(Floats x) {
   return reinterpret_cast<Floats>(_mm256_floor_ps(reinterpret_cast<__m256>(x)));
 }
 /// The nearest whole number; halves to an even one.
-inline Floats rint(Floats x) {
+inline Floats to_nearest(Floats x) {
   return reinterpret_cast<Floats>(
       _mm256_round_ps(reinterpret_cast<__m256>(x), _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC));
 }

@@ -163,7 +163,7 @@ inline Floats floor(Floats x) {
   return {_mm_floor_ps(x.low), _mm_floor_ps(x.high)};
 }
 /// The nearest whole number; halves to an even one.
-inline Floats rint(Floats x) {
+inline Floats to_nearest(Floats x) {
   constexpr int kNearest = _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC;
   return {_mm_round_ps(x.low, kNearest), _mm_round_ps(x.high, kNearest)};
 }

@@ -33,13 +33,22 @@ typedef int8 Mask;  ///< -1 or 0 in each lane
 #define larger(a, b) select(b, a, (a) > (b))
 
 #if defined(__AVX__)
-typedef float MaskRegister __attribute__((__vector_size__(32)));
+typedef float FloatRegister __attribute__((__vector_size__(32)));
 #endif
+
+/// The nearest whole numbers, of two the even one.
+ISO_INLINE Floats to_nearest(Floats x) {
+#if defined(__AVX__) /* else drivers may take twenty instructions */
+  return __builtin_astype(__builtin_ia32_roundps256(__builtin_astype(x, FloatRegister), 8), Floats);
+#else
+  return rint(x);
+#endif
+}
 
 /// Lane i in bit i.
 ISO_INLINE uint bits_of(Mask mask) {
 #if defined(__AVX__) /* else compilers combine lane after lane, which takes ten times as long */
-  return (uint)__builtin_ia32_movmskps256(__builtin_astype(mask, MaskRegister));
+  return (uint)__builtin_ia32_movmskps256(__builtin_astype(mask, FloatRegister));
 #else
   const int8 bits = mask & (int8)(1, 2, 4, 8, 16, 32, 64, 128);
   const int4 four = bits.lo | bits.hi;

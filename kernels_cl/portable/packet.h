@@ -319,7 +319,7 @@ ISO_INLINE Ints packet_locate(const PacketRays *r, int axis, int size, Floats t,
                at = in_brick(a, pick(on_plane, behind, position)), x = at * (1.0f / (float)size);
   const Ints at_least = larger(to_ints(x), range.first), /* below 0, either way the first */
       places = smaller(at_least, range.last);
-  const Floats distance = fabs(at - (float)size * rint(x)),
+  const Floats distance = fabs(at - (float)size * to_nearest(x)),
                error = ISO_FLOAT_DOUBT * (fabs(position) + fabs(a->o));
   const Mask doubt = lanes & ~on_plane & (distance <= error);
   if (ISO_UNLIKELY(any(doubt))) return settle_places(r, axis, size, range, doubt, places);

@@ -33,8 +33,9 @@ ISO_INLINE CellsAtBorder cells_at_border(const PacketScene *scene, const PacketR
                  error = ISO_FLOAT_DOUBT * (fabs(position) + fabs(a->o)),
                  last = floats((float)scene->last[axis]);
     cells.within &= (at > 0.0f) & (at < last);
-    cells.block_certain &= (fabs(at - 4.0f * rint(0.25f * at)) > error) & (fabs(at - last) > error);
-    cells.is_certain &= fabs(at - rint(at)) > error;
+    cells.block_certain &=
+        (fabs(at - 4.0f * to_nearest(0.25f * at)) > error) & (fabs(at - last) > error);
+    cells.is_certain &= fabs(at - to_nearest(at)) > error;
     const Floats not_below = larger(at, floats(0.0f)), within = smaller(not_below, last);
     cells.at[axis] = to_ints(within);
   }
