@@ -49,6 +49,7 @@ typedef struct PacketField {
   global const uint *all_masks, *no_data;
   global const ushort *ranges;
   uint no_data_begin;
+  uint *macrocell_sides; /* [ISO_KNOWN_SIDES], see packet_bands.h */
   CacheReader cache;
   OpenedBlock *opened; /* [ISO_OPENED_BLOCKS] */
   PacketProgress *progress;
@@ -159,12 +160,14 @@ ISO_INLINE Mask load_corners(const PacketField *field, const FrameParams *frame,
 }
 
 #include "portable/packet_walk.h"
+
 /// Where the rays of a launch go.
 typedef struct LaunchRays {
   volatile global uint *num_waiting;
   global uint *waiting, *ray_block_ids;
   global HitRecord *hits;
-  uint num_met, num_hits;  ///< rays that have come to their first active block; that hit
+  global uint *band_packets;  ///< BandPacket of each packet that draws, see packet_bands.h
+  uint num_met, num_hits;     ///< rays that have come to their first active block; that hit
 } LaunchRays;
 
 #if ISO_BANDS
@@ -195,21 +198,56 @@ typedef struct PacketSource {
   Mask lanes;
   Ints ray_ids, column, row;
   Ints log_ahead;  ///< of each RayEntry
+  uint number;     ///< packet_number(); of a list, 0
 } PacketSource;
 
 ISO_INLINE uint tiles_along(uint rays, uint tile_rays) {
   return (rays + tile_rays - 1) / tile_rays;
 }
 
-/// Packet `packet` of the picture's tile `tile`: those of 16 columns, then of the next 16.
-ISO_INLINE PacketSource picture_packet(const View *view, uint tile, uint packet) {
-  const uint tiles_x = tiles_along(view->width, ISO_TILE_COLUMNS), packets_y = ISO_TILE_ROWS / 2;
-  const uint x = ISO_TILE_COLUMNS * (tile % tiles_x) + 16 * (packet / 4 / packets_y) +
-                 4 * (packet % 4),
-             y = ISO_TILE_ROWS * (tile / tiles_x) + 2 * (packet / 4 % packets_y);
+/// The first ray of a packet, of 4 columns and 2 rows.
+typedef struct PacketPlace {
+  int x, y;
+} PacketPlace;
+
+/// The first packet of a tile of the picture.
+ISO_INLINE PacketPlace tile_place(const View *view, uint tile) {
+  const uint tiles_x = tiles_along(view->width, ISO_TILE_COLUMNS);
+  PacketPlace place;
+  place.x = (int)(ISO_TILE_COLUMNS * (tile % tiles_x));
+  place.y = (int)(ISO_TILE_ROWS * (tile / tiles_x));
+  return place;
+}
+
+/// A tile's packet `packet`: those of 16 columns, then of the next 16.
+ISO_INLINE PacketPlace packet_place(PacketPlace tile, uint packet) {
+  const uint packets_y = ISO_TILE_ROWS / 2;
+  PacketPlace place;
+  place.x = tile.x + (int)(16 * (packet / 4 / packets_y) + 4 * (packet % 4));
+  place.y = tile.y + (int)(2 * (packet / 4 % packets_y));
+  return place;
+}
+
+/// The number of a packet among those of the picture.
+ISO_INLINE uint packet_number(const View *view, PacketPlace place) {
+  return (uint)place.x / 4 + tiles_along(view->width, 4) * ((uint)place.y / 2);
+}
+
+/// May rays of a packet meet the box of the active blocks, or, behind the first band, do any go on?
+ISO_INLINE int may_draw(const FrameParams *frame, PacketPlace place, uint begins,
+                        const LaunchRays *rays) {
+  const ScreenBox box = frame->screen;
+  return place.x + 4 > (int)box.begin_x && place.x < (int)box.end_x &&
+         place.y + 2 > (int)box.begin_y && place.y < (int)box.end_y &&
+         (begins != ISO_BEGINS_BAND ||
+          (rays->band_packets[packet_number(&frame->view, place)] & 0xFFu) != 0);
+}
+
+ISO_INLINE PacketSource picture_packet(const View *view, PacketPlace place) {
   PacketSource source;
-  source.column = (int)x + (int8)(0, 1, 2, 3, 0, 1, 2, 3);
-  source.row = (int)y + (int8)(0, 0, 0, 0, 1, 1, 1, 1);
+  source.number = packet_number(view, place);
+  source.column = place.x + (int8)(0, 1, 2, 3, 0, 1, 2, 3);
+  source.row = place.y + (int8)(0, 0, 0, 0, 1, 1, 1, 1);
   source.ray_ids = source.column + (int)view->width * source.row;
   source.log_ahead = ints(ISO_FIRST_LOG_AHEAD);
   source.lanes = (source.column < (int)view->width) & (source.row < (int)view->height);
@@ -259,6 +297,7 @@ ISO_INLINE Mask on_screen(ScreenBox box, PacketSource source) {
 ISO_INLINE PacketSource listed_packet(const View *view, global const uint *entries, uint num_rays,
                                       uint packet) {
   PacketSource source;
+  source.number = 0;
   source.lanes = source.column = source.row = source.ray_ids = source.log_ahead = ints(0);
   for (uint lane = 0; lane < ISO_LANES; ++lane) {
     const uint i = ISO_LANES * packet + lane;
@@ -305,57 +344,53 @@ ISO_INLINE void draw_packet(Packet *p, const PacketScene *scene, int is_active_s
   const FrameParams *frame = scene->frame;
   PacketProgress *progress = scene->field->progress;
   const Ints ray_ids = source.ray_ids;
-  Ints states = ints((int)ISO_GOES_ON);
-  Mask lanes = source.lanes, kept = source.lanes;
-  if (begins == ISO_BEGINS_FRAME) {
-    lanes = on_screen(frame->screen, source);
-  } else {
-    states = read_states(ray_ids, source.lanes, rays->ray_block_ids);
-    lanes &= (states & ~7) == (int)ISO_GOES_ON;
-    kept = lanes;
+  global uint *kept = &rays->band_packets[source.number];
+  const int is_first = begins == ISO_BEGINS_FRAME;
+  const BandPacket before = unpack_band_packet(is_first ? 0 : *kept);
+  Mask lanes = is_first ? on_screen(frame->screen, source) : before.lanes;
+  if (!any(lanes)) {
+    if (is_first) *kept = 0;
+    return;
   }
-  if (any(lanes)) {
-    const Ints before = states & 3;
-    make_packet_axes(frame, source.column, source.row, p->rays.axis);
-    p->rays.begin_t = frame->band.begin_t;
-    p->rays.end_t = frame->band.end_t;
-    const Mask comes = lanes & (before != (int)ISO_SIDE_UNKNOWN);
-    if (any(comes)) {
-      const Ints sides = sides_at(scene, &p->rays, p->rays.begin_t, comes);
-      const Mask differs = comes & (sides != (int)ISO_SIDE_UNKNOWN) & (sides != before);
-      if (any(differs))
-        lanes &= ~differs | cross_border(scene, &p->rays, ray_ids, before, differs, rays);
-      kept &= ~differs | lanes;
-    }
-    if (is_active_somewhere && any(lanes)) {
-      const Mask enters = enter_box(&p->rays, scene) & lanes;
-      if (any(enters)) {
-        open_packet(p, scene);
-        begin_at_box(p, scene, enters);
-        walk_packet(p, scene);
-        if (any(p->found.lanes)) write_hits(p, scene, ray_ids, ISO_ROOT_STEPS, rays->hits);
-        if (any(p->waits))
-          list_waiting(p, frame, source, progress->moved, rays->num_waiting, rays->waiting,
-                       rays->ray_block_ids);
-        rays->num_hits += popcount(bits_of(p->found.lanes));
-        rays->num_met += popcount(bits_of(progress->met & ((states & (int)ISO_HAS_MET) == 0)));
-        lanes &= ~(p->found.lanes | p->waits);
-        kept &= ~p->waits;
-      }
+  make_packet_axes(frame, source.column, source.row, p->rays.axis);
+  p->rays.begin_t = frame->band.begin_t;
+  p->rays.end_t = frame->band.end_t;
+  const Mask comes = lanes & (before.sides != (int)ISO_SIDE_UNKNOWN);
+  if (any(comes)) {
+    const Ints sides = sides_at(scene, &p->rays, p->rays.begin_t, comes);
+    const Mask differs = comes & (sides != (int)ISO_SIDE_UNKNOWN) & (sides != before.sides);
+    if (any(differs))
+      lanes &= ~differs | cross_border(scene, &p->rays, ray_ids, before.sides, differs, rays);
+  }
+  if (is_active_somewhere && any(lanes)) {
+    const Mask enters = enter_box(&p->rays, scene) & lanes;
+    if (any(enters)) {
+      open_packet(p, scene);
+      begin_at_box(p, scene, enters);
+      walk_packet(p, scene);
+      if (any(p->found.lanes)) write_hits(p, scene, ray_ids, ISO_ROOT_STEPS, rays->hits);
+      if (any(p->waits))
+        list_waiting(p, frame, source, progress->moved, rays->num_waiting, rays->waiting,
+                     rays->ray_block_ids);
+      rays->num_hits += popcount(bits_of(p->found.lanes));
+      rays->num_met += popcount(bits_of(progress->met & ~before.met));
+      lanes &= ~(p->found.lanes | p->waits);
     }
   }
   if (frame->band.end_t == INFINITY) return;
-  Ints sides = ints(0);
-  if (any(lanes)) {
-    sides = sides_at(scene, &p->rays, p->rays.end_t, lanes);
-    Mask open = lanes & (sides == (int)ISO_SIDE_NOT_CERTAIN);
+  BandPacket behind;
+  behind.lanes = lanes;
+  behind.met = before.met | progress->met;
+  behind.sides = ints(0);
+  if (any(behind.lanes)) {
+    behind.sides = sides_at(scene, &p->rays, p->rays.end_t, behind.lanes);
+    const Mask open = behind.lanes & (behind.sides == (int)ISO_SIDE_NOT_CERTAIN);
     if (any(open)) {
-      sides = sides_of_each(scene, &p->rays, ray_ids, open, sides, rays);
-      kept &= ~(lanes & (sides == (int)ISO_SIDE_NOT_CERTAIN));
+      behind.sides = sides_of_each(scene, &p->rays, ray_ids, open, behind.sides, rays);
+      behind.lanes &= behind.sides != (int)ISO_SIDE_NOT_CERTAIN;
     }
   }
-  const Ints met = (states | (progress->met & (int)ISO_HAS_MET)) & (int)ISO_HAS_MET;
-  keep_states(lanes & ((int)ISO_GOES_ON | met | sides), ray_ids, kept, rays->ray_block_ids);
+  *kept = pack_band_packet(behind);
 }
 #else
 /// Puts rays that wait back to the blocks where they stand.
@@ -405,6 +440,18 @@ ISO_INLINE void draw_packet(Packet *p, const PacketScene *scene, int is_active_s
 }
 #endif
 
+/// Adds what a work-item has done.
+ISO_INLINE void add_counts(const LaunchRays *rays, uint num_blocks, uint num_made, uint begins,
+                           global PassCounts *counts) {
+  if (rays->num_hits != 0) atomic_add(&counts->hit_count, rays->num_hits);
+  if (num_made != 0) {
+    atomic_add(&counts->decoded_count, num_made);
+    atomic_sub(&counts->free_count, num_made);
+  }
+  if (num_blocks != 0) atomic_add(&counts->granted_count, num_blocks);
+  if (begins != 0 && rays->num_met != 0) atomic_add(&counts->active_count, rays->num_met);
+}
+
 /// Walks rays on until they hit, leave or wait: those of the picture, in the first pass of a frame,
 /// or those that wait.
 ///
@@ -413,7 +460,7 @@ ISO_INLINE void draw_packet(Packet *p, const PacketScene *scene, int is_active_s
 /// macrocell_masks  as traverse
 /// ranges, no_data, no_data_begin  as start_rays, with ISO_LEVELS alone
 /// In      active_ray_ids [prev->next_active_count] and ray_block_ids [pixel] of the rays that
-///         wait; begins: none
+///         wait; begins: none; ISO_BANDS: active_ray_ids has room for a word for each packet
 /// Out     as march; begins: hits of all pixels, and counts->active_count, the rays that have met
 ///         an active block. With what has been decoded on demand, counts->decoded_count grows and
 ///         counts->free_count shrinks
@@ -424,7 +471,7 @@ kernel __attribute__((reqd_work_group_size(1, 1, 1))) void march_packets(
     global const uint *index, const StreamLayout layout, global const uint *macrocell_masks,
     global const ushort *ranges, global const uint *no_data, uint no_data_begin,
     global BlockEntry *table, global ulong *inside, global SlotValue *cache_values,
-    global const PassCounts *prev, global PassCounts *counts, global const uint *active_ray_ids,
+    global const PassCounts *prev, global PassCounts *counts, global uint *active_ray_ids,
     global uint *next_active_ray_ids, global uint *ray_block_ids, global HitRecord *hits,
     global uint *slot_block_ids, global uint *slot_stamps, global uint *requested_bits,
     global const uint *free_slots, global CacheState *cache) {
@@ -452,37 +499,48 @@ kernel __attribute__((reqd_work_group_size(1, 1, 1))) void march_packets(
       .stamp = stamp,
   };
   PacketProgress progress = {.num_blocks = 0};
+#if ISO_BANDS
+  uint macrocell_sides[ISO_KNOWN_SIDES];
+  for (uint i = 0; i < ISO_KNOWN_SIDES; ++i) macrocell_sides[i] = ISO_NO_MACROCELL;
+#endif
   const PacketField field = {
-      .macrocell_masks = macrocell_masks + masks_begin(frame),
-      .all_masks = macrocell_masks,
-      .no_data = no_data,
-      .ranges = ranges,
-      .no_data_begin = no_data_begin,
-      .cache = {.table = table,
-                .inside = inside,
-                .values = cache_values,
-                .slot_stamps = slot_stamps,
-                .stamp = stamp,
-                .slots = slots},
-      .opened = opened,
-      .progress = &progress,
-      .maker = &maker,
+    .macrocell_masks = macrocell_masks + masks_begin(frame),
+    .all_masks = macrocell_masks,
+    .no_data = no_data,
+    .ranges = ranges,
+    .no_data_begin = no_data_begin,
+#if ISO_BANDS
+    .macrocell_sides = macrocell_sides,
+#endif
+    .cache = {.table = table,
+              .inside = inside,
+              .values = cache_values,
+              .slot_stamps = slot_stamps,
+              .stamp = stamp,
+              .slots = slots},
+    .opened = opened,
+    .progress = &progress,
+    .maker = &maker,
   };
   LaunchRays rays = {
       .num_waiting = &counts->next_active_count,
       .waiting = next_active_ray_ids,
       .ray_block_ids = ray_block_ids,
       .hits = hits,
+      .band_packets = active_ray_ids,
   };
   PacketScene scene;
   for (uint i = 0; i < ISO_OPENED_BLOCKS; ++i) opened[i].block_id = ISO_INVALID_ID;
   for (uint i = 0; i < ISO_BRICK_VOXELS; ++i) opened[0].voxels[i] = 0; /* read by idle lanes */
   const int is_active_somewhere = make_packet_scene(frame, &field, &scene);
   for (uint chunk = get_group_id(0); chunk < num_chunks; chunk += get_num_groups(0)) {
+    const PacketPlace tile = tile_place(&frame->view, chunk);
     if (begins == ISO_BEGINS_FRAME) clear_hits(&frame->view, chunk, hits);
     for (uint packet = 0; packet < (begins != 0 ? ISO_TILE_PACKETS : ISO_LIST_PACKETS); ++packet) {
+      const PacketPlace place = packet_place(tile, packet);
+      if (ISO_BANDS && !may_draw(frame, place, begins, &rays)) continue;
       const PacketSource source = begins != 0
-                                      ? picture_packet(&frame->view, chunk, packet)
+                                      ? picture_packet(&frame->view, place)
                                       : listed_packet(&frame->view, active_ray_ids, num_rays,
                                                       ISO_LIST_PACKETS * chunk + packet);
       Packet p;
@@ -492,11 +550,5 @@ kernel __attribute__((reqd_work_group_size(1, 1, 1))) void march_packets(
     }
   }
   end_streams();
-  if (rays.num_hits != 0) atomic_add(&counts->hit_count, rays.num_hits);
-  if (maker.num_made != 0) {
-    atomic_add(&counts->decoded_count, maker.num_made);
-    atomic_sub(&counts->free_count, maker.num_made);
-  }
-  if (progress.num_blocks != 0) atomic_add(&counts->granted_count, progress.num_blocks);
-  if (begins != 0 && rays.num_met != 0) atomic_add(&counts->active_count, rays.num_met);
+  add_counts(&rays, progress.num_blocks, maker.num_made, begins, counts);
 }

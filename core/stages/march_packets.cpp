@@ -94,8 +94,10 @@ void MarchPackets::operator()(const Macrocells &macrocells, std::span<const Band
                              .try_emplace(std::move(defines), device_,
                                           with_levels(with_stream(defines_, &band.stream), true))
                              .first->second;
-    march(kernel, band.frame, std::exchange(begins, ISO_BEGINS_BAND), band.stream, macrocells,
-          cache, rays);
+    FrameParams frame = band.frame;
+    frame.screen = bands.front().frame.screen;  // packets beside it have drawn nothing
+    march(kernel, frame, std::exchange(begins, ISO_BEGINS_BAND), band.stream, macrocells, cache,
+          rays);
   }
 }
 

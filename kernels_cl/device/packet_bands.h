@@ -1,17 +1,17 @@
 /// packet_bands.h -- eight rays at a time through the band of one level of detail, and over its
 /// borders (march_packets.cl). OpenCL C 1.2. As core/host/host_bands.hpp.
 ///
-/// The first pass of a frame has a launch for each band. Between two launches, ray_block_ids has of
-/// each ray that goes on ISO_GOES_ON, with the side on which it left its band, and ISO_HAS_MET; of
-/// one that waits, its stand; of others, anything else.
+/// The first pass of a frame has a launch for each band. Between two launches, a word for each
+/// packet says which of its rays go on: BandPacket.
 #ifndef ISOWAVE_PACKET_BANDS_H
 #define ISOWAVE_PACKET_BANDS_H
 
 #include "level_borders.h"
 #include "portable/packet_walk.h"
 
-#define ISO_GOES_ON 0xC0000000u /* no stand has side 3 */
-#define ISO_HAS_MET 4u          ///< it has come to an active block
+/// Macrocells whose sides a work-item knows. Neighbouring packets come to the same macrocells.
+#define ISO_KNOWN_SIDES 8u
+#define ISO_NO_MACROCELL 0xFFFFFFFFu
 
 /// The voxels of cached block b that are inside, a bit for each.
 ISO_INLINE ulong inside_of(const CacheReader *cache, const FrameParams *frame, BlockCoords b) {
@@ -24,13 +24,55 @@ ISO_INLINE Mask has_bit(uint low, uint high, Ints numbers) {
   return -((pick(numbers < 32, ints((int)low), ints((int)high)) >> (numbers & 31)) & 1);
 }
 
+/// The side on which a whole macrocell is; unknown if one of its blocks is active. Blocks without
+/// active ones between them are on one side, as they share voxels.
+///
+/// number  x + columns * (y + rows * z) of the macrocell
+/// place   its place in field->macrocell_sides: number << 2 | side
+/// b       one of its blocks
+ISO_INLINE uint side_of_macrocell(const PacketField *field, const FrameParams *frame, uint number,
+                                  uint place, BlockCoords b) {
+  global const uint *mask = field->macrocell_masks + 2 * number;
+  uint known = field->macrocell_sides[place];
+  if (known >> 2 != number) {
+    known = number << 2 |
+            ((mask[0] | mask[1]) != 0 ? ISO_SIDE_UNKNOWN
+                                      : side_of_block(frame, field->all_masks, field->ranges, b));
+    field->macrocell_sides[place] = known;
+  }
+  return known & 3u;
+}
+
+/// sides_in_cells() of lanes in macrocells without active blocks. Returns the other lanes.
+ISO_INLINE Mask sides_in_macrocells(const PacketField *field, const FrameParams *frame,
+                                    const Ints *at, Mask lanes, Ints *sides) {
+  const int columns = (int)(frame->grid.blocks_x + 3) / 4,
+            rows = (int)(frame->grid.blocks_y + 3) / 4;
+  const Ints x = at[0] >> 4, y = at[1] >> 4, z = at[2] >> 4, numbers = x + columns * (y + rows * z),
+             places = (x & 1) + 2 * (y & 1) + 4 * (z & 1);
+  Mask left = lanes, others = ints(0);
+  while (any(left)) {
+    const uint first = first_lane(bits_of(left));
+    const BlockCoords b = {(uint)at[0][first] >> 2, (uint)at[1][first] >> 2,
+                           (uint)at[2][first] >> 2};
+    const Mask here = left & (numbers == numbers[first]);
+    const uint side = side_of_macrocell(field, frame, (uint)numbers[first], (uint)places[first], b);
+    left &= ~here;
+    if (side != ISO_SIDE_UNKNOWN)
+      *sides = pick(here, ints((int)side), *sides);
+    else
+      others |= here;
+  }
+  return others;
+}
+
 /// As packet_sides.h says.
 ISO_INLINE void sides_in_cells(const PacketField *field, const FrameParams *frame, const Ints *at,
                                Mask lanes, Mask certain, Ints *sides) {
   const Ints numbers = (at[0] & 3) + 4 * (at[1] & 3) + 16 * (at[2] & 3), x = at[0] >> 2,
              y = at[1] >> 2, z = at[2] >> 2;
-  Mask left = lanes;
   if (ISO_NO_DATA && field->no_data_begin != ISO_INVALID_ID) return;
+  Mask left = sides_in_macrocells(field, frame, at, lanes, sides);
   while (any(left)) {
     const uint first = first_lane(bits_of(left));
     const Mask here = left & (x == x[first]) & (y == y[first]) & (z == z[first]);
@@ -153,29 +195,28 @@ ISO_SELDOM Ints sides_of_each(const PacketScene *scene, const PacketRays *r, Int
   return found;
 }
 
-// ---- What a ray keeps between launches
+// ---- What a packet keeps between launches
 
-/// The rays of a packet lie in two rows of four.
-ISO_INLINE Ints read_states(Ints ray_ids, Mask lanes, global const uint *ray_block_ids) {
-  Ints states = ints(0);
-  if (bits_of(lanes) == 0xFFu) {
-    const int4 upper = as_int4(vload4(0, ray_block_ids + ray_ids.s0)),
-               lower = as_int4(vload4(0, ray_block_ids + ray_ids.s4));
-    return (int8)(upper.x, upper.y, upper.z, upper.w, lower.x, lower.y, lower.z, lower.w);
-  }
-  ISO_EACH_LANE(lane, lanes) states[lane] = (int)ray_block_ids[ray_ids[lane]];
-  return states;
+/// The rays of a packet that go on to the next band. A word: bits 0..7: lanes, 8..15: met, 16..23
+/// and 24..31: bits 0 and 1 of the sides.
+typedef struct BandPacket {
+  Mask lanes;
+  Mask met;    ///< have come to an active block
+  Ints sides;  ///< on which they left their band: ISO_SIDE_*
+} BandPacket;
+
+ISO_INLINE uint pack_band_packet(BandPacket packet) {
+  return bits_of(packet.lanes) | bits_of(packet.met) << 8 | bits_of(-(packet.sides & 1)) << 16 |
+         bits_of(-(packet.sides >> 1 & 1)) << 24;
 }
 
-ISO_INLINE void keep_states(Ints states, Ints ray_ids, Mask lanes, global uint *ray_block_ids) {
-  if (bits_of(lanes) == 0xFFu) {
-    vstore4((uint4)((uint)states.s0, (uint)states.s1, (uint)states.s2, (uint)states.s3), 0,
-            ray_block_ids + ray_ids.s0);
-    vstore4((uint4)((uint)states.s4, (uint)states.s5, (uint)states.s6, (uint)states.s7), 0,
-            ray_block_ids + ray_ids.s4);
-  } else {
-    ISO_EACH_LANE(lane, lanes) ray_block_ids[ray_ids[lane]] = (uint)states[lane];
-  }
+ISO_INLINE BandPacket unpack_band_packet(uint word) {
+  const Ints bits = ints((int)word) >> (int8)(0, 1, 2, 3, 4, 5, 6, 7);
+  BandPacket packet;
+  packet.lanes = -(bits & 1);
+  packet.met = -(bits >> 8 & 1);
+  packet.sides = (bits >> 16 & 1) | (bits >> 23 & 2);
+  return packet;
 }
 
 #endif
