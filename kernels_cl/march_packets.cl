@@ -167,6 +167,7 @@ typedef struct LaunchRays {
   global uint *waiting, *ray_block_ids;
   global HitRecord *hits;
   global uint *band_packets;  ///< BandPacket of each packet that draws, see packet_bands.h
+  uint bands_behind;          ///< bands of this frame behind this one
   uint num_met, num_hits;     ///< rays that have come to their first active block; that hit
 } LaunchRays;
 
@@ -379,7 +380,7 @@ ISO_INLINE void draw_packet(Packet *p, const PacketScene *scene, int is_active_s
   }
   if (frame->band.end_t == INFINITY) return;
   BandPacket behind;
-  behind.lanes = lanes;
+  behind.lanes = lanes & ~have_left(scene, &p->rays, p->rays.end_t, rays->bands_behind);
   behind.met = before.met | progress->met;
   behind.sides = ints(0);
   if (any(behind.lanes)) {
@@ -456,6 +457,7 @@ ISO_INLINE void add_counts(const LaunchRays *rays, uint num_blocks, uint num_mad
 /// or those that wait.
 ///
 /// begins           ISO_BEGINS_FRAME: the first pass of a frame; ISO_BEGINS_BAND: a further band
+/// bands_behind     bands of the frame behind this one
 /// part_0 .. layout the zfp stream (block_stream.h), as free_slots for decoding on demand alone
 /// macrocell_masks  as traverse
 /// ranges, no_data, no_data_begin  as start_rays, with ISO_LEVELS alone
@@ -466,7 +468,7 @@ ISO_INLINE void add_counts(const LaunchRays *rays, uint num_blocks, uint num_mad
 ///         counts->free_count shrinks
 /// Launch  groups of one work-item, which stride over chunks of packets
 kernel __attribute__((reqd_work_group_size(1, 1, 1))) void march_packets(
-    const FrameParams frame_params, uint begins, global const uint *part_0,
+    const FrameParams frame_params, uint begins, uint bands_behind, global const uint *part_0,
     global const uint *part_1, global const uint *part_2, global const uint *part_3,
     global const uint *index, const StreamLayout layout, global const uint *macrocell_masks,
     global const ushort *ranges, global const uint *no_data, uint no_data_begin,
@@ -528,6 +530,7 @@ kernel __attribute__((reqd_work_group_size(1, 1, 1))) void march_packets(
       .ray_block_ids = ray_block_ids,
       .hits = hits,
       .band_packets = active_ray_ids,
+      .bands_behind = bands_behind,
   };
   PacketScene scene;
   for (uint i = 0; i < ISO_OPENED_BLOCKS; ++i) opened[i].block_id = ISO_INVALID_ID;

@@ -59,13 +59,13 @@ void MarchPackets::open(BlockCache &cache, Wavefront &rays, uint begins) {
 }
 
 void MarchPackets::march(ocl::Kernel<kernels::march_packets> &kernel, const FrameParams &frame,
-                         uint begins, const DeviceStream &stream, const Macrocells &macrocells,
+                         Begin begin, const DeviceStream &stream, const Macrocells &macrocells,
                          BlockCache &cache, Wavefront &rays) {
   const ocl::Buffer<uint> &none = macrocells.masks();  // stands in for what is not read
   const auto part = [&](std::size_t i) -> const ocl::Buffer<uint> & {
     return on_demand_ ? stream.part(i) : none;
   };
-  kernel(range_, frame, begins, part(0), part(1), part(2), part(3),
+  kernel(range_, frame, begin.of, begin.bands_behind, part(0), part(1), part(2), part(3),
          on_demand_ ? stream.index() : none, stream.layout, macrocells.masks(), macrocells.ranges(),
          macrocells.no_data().words_or(none), macrocells.no_data().begin, cache.table, cache.inside,
          cache.values, rays.previous_counts, rays.counts, rays.active_ray_ids,
@@ -77,7 +77,7 @@ void MarchPackets::operator()(const Macrocells &macrocells, const DeviceStream &
                               BlockCache &cache, Wavefront &rays) {
   const uint begins = std::exchange(begins_, false) ? ISO_BEGINS_FRAME : 0;
   open(cache, rays, begins);
-  march(march_, rays.frame, begins, stream, macrocells, cache, rays);
+  march(march_, rays.frame, {begins, 0}, stream, macrocells, cache, rays);
 }
 
 void MarchPackets::operator()(const Macrocells &macrocells, std::span<const Band> bands,
@@ -96,8 +96,9 @@ void MarchPackets::operator()(const Macrocells &macrocells, std::span<const Band
                              .first->second;
     FrameParams frame = band.frame;
     frame.screen = bands.front().frame.screen;  // packets beside it have drawn nothing
-    march(kernel, frame, std::exchange(begins, ISO_BEGINS_BAND), band.stream, macrocells, cache,
-          rays);
+    const auto behind = static_cast<uint>(&bands.back() - &band);
+    march(kernel, frame, {std::exchange(begins, ISO_BEGINS_BAND), behind}, band.stream, macrocells,
+          cache, rays);
   }
 }
 

@@ -69,7 +69,11 @@ class MarchPackets {
 
  private:
   void open(BlockCache &cache, Wavefront &rays, uint begins);
-  void march(ocl::Kernel<kernels::march_packets> &kernel, const FrameParams &frame, uint begins,
+  /// What a launch begins with (ISO_BEGINS_*), and how many bands follow behind it.
+  struct Begin {
+    uint of, bands_behind;
+  };
+  void march(ocl::Kernel<kernels::march_packets> &kernel, const FrameParams &frame, Begin begin,
              const DeviceStream &stream, const Macrocells &macrocells, BlockCache &cache,
              Wavefront &rays);
 
