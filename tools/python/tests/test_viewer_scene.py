@@ -587,9 +587,8 @@ def test_100_reconnects_leave_nothing() -> None:
         session.receive({"type": "hello", "version": 3})
         wish = {"type": "wish", "id": 1, "isovalue": 80, "size": [32, 32], "camera": None}
         wish |= {"color": [1, 1, 1], "background": [0, 0, 0], "samples": 1}
-        session.receive(
-            wish | {"max_error": None, "by": "proof", "time_budget": None, "ambient": 0}
-        )
+        wish |= {"max_error": None, "by": "proof", "time_budget": None, "ambient": 0}
+        session.receive(wish)
         if i % 10 == 0:
             assert ready.wait(60)
         ready.clear()
