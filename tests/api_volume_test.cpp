@@ -49,6 +49,16 @@ TEST(Api, VolumesSayWhatTheyAre) {
   EXPECT_EQ(volume->value_range()[1], *std::ranges::max_element(voxels));
 }
 
+TEST(Api, VolumesSuggestIsovalues) {
+  const auto volume = sphere({});
+  const std::vector<double> suggested = volume->suggested_isovalues();
+  ASSERT_FALSE(suggested.empty());
+  for (const double isovalue : suggested) EXPECT_EQ(volume->isovalue_notice(isovalue), "");
+  EXPECT_EQ(volume->suggested_isovalues(), suggested);
+  const std::vector<std::uint8_t> constant(4 * 4 * 4, 7);
+  EXPECT_TRUE(compress(constant, Grid{.dims = {4, 4, 4}})->suggested_isovalues().empty());
+}
+
 TEST(Api, EveryVoxelTypeIsCompressed) {
   const auto check = [](auto zero) {
     using T = decltype(zero);

@@ -437,6 +437,8 @@ TEST_F(CliRanks, RefuseWhatTheyCannotDo) {
   expect_error(on_ranks(2, "render " + convert("--rate 8 --no-verify") +
                                " -i 40 --size 16x16 --max-surface-error 1"),
                "the volume's error is not known");
+  expect_error(on_ranks(2, "render " + kFuel + " -o " + quoted(folder_ / "a.png")),
+               "with mpirun, no process sees the whole volume: give --isovalue");
   expect_error(on_ranks(2, render + "--bricks 2x2x1"), "2 processes draw a brick each");
   expect_error(on_ranks(2, render + "--voxel-pixels 1"), "convert --levels all");
   expect_error(on_ranks(2, "info " + kFuel), "only render and convert");

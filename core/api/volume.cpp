@@ -11,6 +11,7 @@
 #include "core/volume/world_positions.hpp"
 #include "core/zfp/describe_compression.hpp"
 #include "core/zfp/isovalue.hpp"
+#include "core/zfp/isovalue_suggestions.hpp"
 #include "core/zfp/voxel_region.hpp"
 #include "core/zfp/voxel_sample.hpp"
 
@@ -195,6 +196,15 @@ std::vector<float> Volume::decode(std::uint32_t level, const Region &region) con
 std::vector<float> Volume::sample(std::uint64_t max_voxels) const {
   return guarded("decoding",
                  [&] { return core::sample_voxels(implementation_->volume, max_voxels); });
+}
+
+std::vector<double> Volume::suggested_isovalues() const {
+  return guarded("suggesting isovalues", [&] {
+    std::vector<double> isovalues;
+    for (const auto &suggested : core::suggest_isovalues(implementation_->volume).isovalues)
+      isovalues.push_back(suggested.isovalue);
+    return isovalues;
+  });
 }
 
 void Volume::save(const std::filesystem::path &path) const {

@@ -33,11 +33,17 @@ struct ExtractArgs {
   std::string input, output, device, stats;
   VolumeOptions volume;
   CompressionOptions compression;
-  double isovalue = 0;
+  std::optional<double> isovalue;
   std::uint32_t level = 0;
   std::string normals = "smooth", vertices = "apart", stream = "auto";
   ExtractorOptions extractor;
+  bool isovalue_suggested = false;
 };
+
+std::string default_output(const ExtractArgs &options) {
+  const std::string stem = volume_stem(options.input);
+  return options.isovalue ? fmt::format("{}_iso{}.ply", stem, *options.isovalue) : stem + ".ply";
+}
 
 const CompressedVolume &level_of(const CompressedVolume &volume, std::uint32_t level) {
   const std::vector<const CompressedVolume *> levels = levels_of(volume, true);
@@ -59,7 +65,8 @@ nlohmann::ordered_json stats_json(const ExtractArgs &options, const CompressedVo
         {"rate", volume.rate()},
         {"max_voxel_error", volume.max_voxel_error ? nlohmann::ordered_json(*volume.max_voxel_error)
                                                    : nlohmann::ordered_json()}}},
-      {"isovalue", options.isovalue},
+      {"isovalue", *options.isovalue},
+      {"isovalue_suggested", options.isovalue_suggested},
       {"level", options.level},
       {"normals", options.normals},
       {"vertex_places", options.vertices},
@@ -78,16 +85,29 @@ nlohmann::ordered_json stats_json(const ExtractArgs &options, const CompressedVo
       {"memory", memory_json(device.ledger())}};
 }
 
-void run_extract(ExtractArgs options) {
-  const bool names_output = options.output.empty();
-  if (names_output)
-    options.output = fmt::format("{}_iso{}.ply", volume_stem(options.input), options.isovalue);
+void check_outputs(const ExtractArgs &options) {
   mesh_format_of(options.output);  // or throws
   Outputs outputs;
   outputs.read_volume(options.input);
   outputs.write("--output", options.output);
   outputs.write("--stats", options.stats);
   check_json_name(options.stats);
+}
+
+/// If no isovalue was given: takes a suggested one, also for the name of the output.
+void suggest_isovalue(ExtractArgs &options, const CompressedVolume &volume, bool names_output) {
+  if (options.isovalue) return;
+  options.isovalue = suggested_isovalue(volume);
+  options.isovalue_suggested = true;
+  if (!names_output) return;
+  options.output = default_output(options);
+  check_outputs(options);
+}
+
+void run_extract(ExtractArgs options) {
+  const bool names_output = options.output.empty();
+  if (names_output) options.output = default_output(options);
+  check_outputs(options);
   options.extractor.with_normals = options.normals == "smooth";
   options.extractor.vertices =
       options.vertices == "apart" ? VertexPlaces::kApart : VertexPlaces::kExact;
@@ -102,18 +122,19 @@ void run_extract(ExtractArgs options) {
   const CompressedVolume volume =
       load_volume(options.input, to_overrides(options.volume), options.compression, &device);
   print_compression(options.input, volume);
+  suggest_isovalue(options, volume, names_output);
   const CompressedVolume &level = level_of(volume, options.level);
   Extractor extractor(device, level, options.extractor);
   MeshFile file(options.output);
-  const ExtractStats stats = extractor.extract(drawn_isovalue(volume, options.isovalue), file,
+  const ExtractStats stats = extractor.extract(drawn_isovalue(volume, *options.isovalue), file,
                                                make_progress_bar("extracting"));
   compiling.finish();
   file.commit(make_progress_bar("writing"));
   fmt::print("isovalue {}: {} vertices, {} triangles; {} blocks decoded, {:.1f} ms\n",
-             options.isovalue, with_commas(stats.size.num_vertices),
+             *options.isovalue, with_commas(stats.size.num_vertices),
              with_commas(stats.size.num_triangles), with_commas(stats.decoded_blocks),
              stats.total_ms);
-  warn_of_isovalue(volume, options.isovalue);
+  warn_of_isovalue(volume, *options.isovalue);
   if (const std::string notice = file.notice(); !notice.empty()) warn(notice);
   fmt::print("wrote {}: {} bytes; device memory: peak {:.1f} MiB{}\n", one_line(options.output),
              with_commas(OutputGroup::current()->bytes_of(options.output)),
@@ -130,9 +151,10 @@ void add_extract(CLI::App &app) {
       app.add_subcommand("extract", "Write an isosurface as triangles: PLY, STL, OBJ, VTP, glTF");
   command->add_option("VOLUME", options->input, "a .zfp file, or " + std::string(kVolumeHelp))
       ->required();
-  command->add_option("-i,--isovalue", options->isovalue, "value of the field on the surface")
-      ->check(fits_float32())
-      ->required();
+  command
+      ->add_option("-i,--isovalue", options->isovalue,
+                   "value of the field on the surface [the first that `isowave info` suggests]")
+      ->check(fits_float32());
   command->add_option(
       "--output,-o", options->output,
       "file that ends in .ply, .stl, .obj, .vtp, .gltf or .glb; coordinates are in the "

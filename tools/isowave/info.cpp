@@ -14,10 +14,13 @@
 
 #include "core/base/error.hpp"
 #include "core/io/open_volume.hpp"
+#include "core/zfp/isovalue_suggestions.hpp"
 #include "core/zfp/level_bounds.hpp"
 #include "core/zfp/stated_errors.hpp"
+#include "core/zfp/voxel_sample.hpp"
 #include "core/zfp/zfp_stream.hpp"
 #include "tools/isowave/commands.hpp"
+#include "tools/isowave/histogram_text.hpp"
 #include "tools/isowave/render_stats.hpp"
 #include "tools/isowave/volume_options.hpp"
 
@@ -49,6 +52,12 @@ ordered_json describe_grid(const VolumeInfo &info) {
   return result;
 }
 
+/// What is known of a volume, and isovalues if its voxels were looked at.
+struct Description {
+  ordered_json json{};
+  std::optional<IsovalueSuggestions> suggestions{};
+};
+
 /// Reads all of a `.zfp` file and, if it says anything of its voxels, decodes them.
 CompressedVolume scan_zfp(const std::string &path) {
   const CompressedVolume head = read_zfp_file_info(path);
@@ -59,7 +68,7 @@ CompressedVolume scan_zfp(const std::string &path) {
   return volume;
 }
 
-ordered_json describe_zfp(const std::string &path, const RawOverrides &overrides, bool no_scan) {
+Description describe_zfp(const std::string &path, const RawOverrides &overrides, bool no_scan) {
   if (overrides.dims || overrides.type)
     throw Error("{}: --dims and --type are for raw files", path);
   CompressedVolume volume = no_scan ? read_zfp_file_info(path) : scan_zfp(path);
@@ -90,7 +99,8 @@ ordered_json describe_zfp(const std::string &path, const RawOverrides &overrides
     if (!level.bounds.codes.empty()) result["level_errors"].push_back(largest_bound(level.bounds));
   }
   if (known_voxel_error(volume)) result["errors"] = "stated";
-  return result;
+  if (no_scan) return {result};
+  return {result, suggest_isovalues(open_compressed_volume(path, overrides))};
 }
 
 void read(VolumeReader &reader, std::uint32_t z, std::uint32_t num_layers, std::span<float> out) {
@@ -102,8 +112,7 @@ void read(VolumeReader &reader, std::uint32_t z, std::uint32_t num_layers, std::
 
 /// Reads all voxels, a few layers at a time, as what holds them.
 template <class Value>
-void add_value_range(VolumeReader &reader, const std::optional<double> &no_data,
-                     ordered_json &result) {
+void scan_voxels(VolumeReader &reader, const std::optional<double> &no_data, Description &result) {
   const glm::uvec3 dims = reader.info().dims;
   const std::uint64_t layer_size = std::uint64_t(dims.x) * dims.y;
   const auto chunk = std::uint32_t(std::clamp<std::uint64_t>((1u << 22) / layer_size, 1, dims.z));
@@ -111,29 +120,59 @@ void add_value_range(VolumeReader &reader, const std::optional<double> &no_data,
   const auto memory = std::make_unique_for_overwrite<Value[]>(
       layer_size * chunk);  // a file may have fewer than it claims
   const auto no_data_value = static_cast<Value>(no_data.value_or(0));
+  LayerSampler sampler(dims, kMostSuggestionVoxels);
   std::uint64_t no_data_count = 0, infinite_count = 0;
   Value min = std::numeric_limits<Value>::infinity(), max = -min;
   for (std::uint32_t z = 0; z < dims.z; z += chunk) {
     const std::uint32_t layers = std::min(chunk, dims.z - z);
     const std::span voxels(memory.get(), layer_size * layers);
     read(reader, z, layers, voxels);
-    for (const Value value : voxels) {
+    for (Value &value : voxels) {
       if (std::isnan(value) || (no_data && value == no_data_value)) {
         ++no_data_count;
+        value = std::numeric_limits<Value>::quiet_NaN();
         continue;
       }
       if (std::isinf(value)) {
         ++infinite_count;
+        value = std::numeric_limits<Value>::quiet_NaN();
         continue;
       }
       min = std::min(min, value);
       max = std::max(max, value);
     }
+    for (std::uint32_t layer = 0; layer < layers; ++layer)
+      sampler.add_layer<Value>(z + layer, voxels.subspan(layer_size * layer, layer_size));
     if (progress) progress(z + layers, dims.z);
   }
-  if (min <= max) result["value_range"] = {min, max};
-  if (no_data_count > 0) result["no_data_voxels"] = no_data_count;
-  if (infinite_count > 0) result["infinite_voxels"] = infinite_count;
+  if (min <= max) result.json["value_range"] = {min, max};
+  if (no_data_count > 0) result.json["no_data_voxels"] = no_data_count;
+  if (infinite_count > 0) result.json["infinite_voxels"] = infinite_count;
+  const std::array range = {static_cast<float>(min), static_cast<float>(max)};
+  result.suggestions = suggest_isovalues(reader.info(), range, sampler.voxels());
+}
+
+Description describe_voxels(const InfoArgs &options, const RawOverrides &overrides) {
+  Description result{{{"format", "voxels"}}};
+  const std::unique_ptr<VolumeReader> reader = open_any_volume(options.input, overrides);
+  warn_of_header(options.input, overrides);
+  result.json.update(describe_grid(reader->info()));
+  if (options.no_scan) return result;
+  if (fits_float32(reader->info().type)) {
+    scan_voxels<float>(*reader, options.no_data, result);
+  } else {
+    scan_voxels<double>(*reader, options.no_data, result);
+  }
+  return result;
+}
+
+void add_suggestions(const IsovalueSuggestions &suggestions, ordered_json &result) {
+  result["histogram"] = {{"range", suggestions.range}, {"counts", suggestions.counts}};
+  result["suggested_isovalues"] = ordered_json::array();
+  for (const SuggestedIsovalue &suggested : suggestions.isovalues) {
+    result["suggested_isovalues"].push_back(
+        {{"isovalue", suggested.isovalue}, {"by", to_string(suggested.by)}});
+  }
 }
 
 std::string to_text(const ordered_json &value) {
@@ -159,35 +198,36 @@ void run(const InfoArgs &options) {
   if (is_zfp_name(options.input)) {
     if (options.no_data)
       throw Error("--no-data: {} is compressed already: leave out the option", options.input);
-    result.update(describe_zfp(options.input, overrides, options.no_scan));
-  } else {
-    const std::unique_ptr<VolumeReader> reader = open_any_volume(options.input, overrides);
-    warn_of_header(options.input, overrides);
-    result["format"] = "voxels";
-    result.update(describe_grid(reader->info()));
-    if (!options.no_scan && fits_float32(reader->info().type))
-      add_value_range<float>(*reader, options.no_data, result);
-    if (!options.no_scan && !fits_float32(reader->info().type))
-      add_value_range<double>(*reader, options.no_data, result);
   }
+  const Description description = is_zfp_name(options.input)
+                                      ? describe_zfp(options.input, overrides, options.no_scan)
+                                      : describe_voxels(options, overrides);
+  result.update(description.json);
+  const std::optional<IsovalueSuggestions> &suggestions = description.suggestions;
+  const bool has_isovalues = suggestions && !suggestions->isovalues.empty();
   if (options.json) {
+    if (has_isovalues) add_suggestions(*suggestions, result);
     fmt::print("{}", json_text(result));
     return;
   }
   for (const auto &[key, value] : result.items()) fmt::print("{:<16}{}\n", key, to_text(value));
+  if (!has_isovalues) return;
+  fmt::print("{:<16}{}\n{}", "isovalues", suggestions_line(*suggestions),
+             histogram_text(*suggestions, prints_utf8()));
 }
 
 }  // namespace
 
 void add_info(CLI::App &app) {
   const auto options = std::make_shared<InfoArgs>();
-  CLI::App *command = app.add_subcommand("info", "Print everything known of a volume file");
+  CLI::App *command =
+      app.add_subcommand("info", "Print everything known of a volume file, and isovalues to draw");
   command->add_option("FILE", options->input, std::string(kVolumeHelp) + ", or .zfp")->required();
   command->add_flag("--json", options->json, "print JSON");
-  command->add_flag(
-      "--no-scan", options->no_scan,
-      "look only at the header: no value range, no checksum of the data, no check that a .zfp "
-      "file's trailer agrees with its voxels");
+  command->add_flag("--no-scan", options->no_scan,
+                    "look only at the header: no value range, no isovalues, no checksum of the "
+                    "data, no check that a .zfp "
+                    "file's trailer agrees with its voxels");
   add_volume_options(*command, options->volume);
   add_no_data_option(*command, options->no_data);
   command->callback([options] { run(*options); });

@@ -382,9 +382,18 @@ ordered_json document_of_team(const RenderArgs &options, const Drawing &drawing,
 
 void print_picture_name(const RenderArgs &options, std::size_t num_views) {
   fmt::print("wrote {}; --output names another file\n",
-             num_views * options.frame.isovalues.size() == 1
+             num_frames(options, num_views) == 1
                  ? options.image
                  : fmt::format("{}_isoV_viewK.png", volume_stem(options.input)));
+}
+
+/// If no isovalue was given: takes a suggested one, also for the names of files.
+void suggest_isovalue(RenderArgs &options, const Drawing &drawing, Outputs &outputs) {
+  if (!options.frame.isovalues.empty()) return;
+  options.frame.isovalues = {suggested_isovalue(drawing.whole)};
+  options.isovalue_suggested = true;
+  if (options.names_picture) options.image = default_image(options, drawing.views.count);
+  outputs = check_outputs(options, drawing.views.count);
 }
 
 /// Opens the device, if one draws, loads the volume and makes the renderer.
@@ -403,6 +412,7 @@ void set_up(const CLI::App &command, RenderArgs &options, Drawing &drawing) {
     load_bricks(options, drawing);
   } else {
     load_alone(options, drawing);
+    suggest_isovalue(options, drawing, outputs);
     if (drawing.device && !compiling) compiling.emplace(*drawing.device);  // instead of the host
   }
   together(drawing.team, [&] {
@@ -428,9 +438,9 @@ void run_render(const CLI::App &command, RenderArgs options) {
     agree_on(drawing.team, "command line", MpiJob::command_line());
   }
   options.voxel_pixels = options.renderer_flags.voxel_pixels;
-  const bool names_picture = !asks_for_output(options);
+  options.names_picture = !asks_for_output(options);
   drawing.views = read_views(options.frame);
-  if (names_picture) options.image = default_image(options, drawing.views.count);
+  if (options.names_picture) options.image = default_image(options, drawing.views.count);
   check_options(command, options, drawing.team);
   drawing.appearance.surface = parse_color("--color", options.color);
   drawing.appearance.background = parse_color("--background", options.background);
@@ -457,7 +467,7 @@ void run_render(const CLI::App &command, RenderArgs options) {
   together(drawing.team, [&] {
     if (drawing.team.rank() == 0 && !options.stats.empty()) write_json(document, options.stats);
   });
-  if (names_picture) print_picture_name(options, drawing.views.count);
+  if (options.names_picture) print_picture_name(options, drawing.views.count);
 }
 
 }  // namespace

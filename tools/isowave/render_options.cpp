@@ -33,9 +33,13 @@ std::array<float, 3> parse_color(const char *option, const std::string &text) {
   throw Error("{} {}: give a colour as #RRGGBB", option, text);
 }
 
+std::size_t num_frames(const RenderArgs &options, std::size_t num_views) {
+  return num_views * std::max<std::size_t>(1, options.frame.isovalues.size());
+}
+
 fs::path frame_path(const fs::path &path, std::size_t num_views, const RenderArgs &options,
                     double isovalue, std::size_t view) {
-  if (path.empty() || num_views * options.frame.isovalues.size() == 1) return path;
+  if (path.empty() || num_frames(options, num_views) == 1) return path;
   fs::path result = path;
   result.replace_filename(fmt::format("{}_iso{}_view{}{}", path.stem().string(), isovalue, view,
                                       path.extension().string()));
@@ -44,7 +48,7 @@ fs::path frame_path(const fs::path &path, std::size_t num_views, const RenderArg
 
 std::string default_image(const RenderArgs &options, std::size_t num_views) {
   const std::string stem = volume_stem(options.input);
-  if (num_views * options.frame.isovalues.size() > 1) return stem + ".png";
+  if (num_frames(options, num_views) > 1 || options.frame.isovalues.empty()) return stem + ".png";
   return fmt::format("{}_iso{}.png", stem, options.frame.isovalues.front());
 }
 
@@ -98,6 +102,10 @@ void check_options(const CLI::App &command, const RenderArgs &options, const Tea
     refuse_options(command, {"--reference", "--verbose"},
                    fmt::format("cannot be used with mpirun: {} processes draw parts of the volume",
                                team.size()));
+    if (options.frame.isovalues.empty())
+      throw Error(
+          "with mpirun, no process sees the whole volume: give --isovalue; isowave info suggests "
+          "some");
   } else {
     refuse_options(command, {"--bricks"}, "one process draws the whole: start more by mpirun");
   }
@@ -130,7 +138,10 @@ Outputs check_outputs(const RenderArgs &options, std::size_t num_views) {
   outputs.read_volume(options.input);
   if (!options.frame.cameras.empty()) outputs.read(options.frame.cameras);
   outputs.write("--stats", options.stats);
-  for (const double isovalue : options.frame.isovalues) {
+  // A suggested isovalue, which is not known yet, changes the names of files, not their folders.
+  std::vector<double> isovalues = options.frame.isovalues;
+  if (isovalues.empty()) isovalues = {0};
+  for (const double isovalue : isovalues) {
     for (std::size_t view = 0; view < num_views; ++view) {
       const auto write = [&](const char *option, const std::string &name) {
         outputs.write(option, frame_path(name, num_views, options, isovalue, view));
@@ -187,7 +198,10 @@ void add_render_options(CLI::App &command, RenderArgs &options) {
   command.add_option("VOLUME", options.input, "a .zfp file, or " + std::string(kVolumeHelp))
       ->required();
   add_volume_options(command, options.volume);
-  add_frame_options(command, options.frame)->required();
+  add_frame_options(command, options.frame)
+      ->description(
+          "isovalue; repeat it for more surfaces, each drawn from all views [the first that "
+          "`isowave info` suggests]");
   command
       .add_option("--samples", options.frame.samples,
                   "N x N rays per pixel, whose mean colour it gets; other options still count the "

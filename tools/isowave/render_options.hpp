@@ -33,7 +33,9 @@ struct RenderArgs {
   double voxel_pixels = 0;                  ///< FrameRequest::voxel_pixels
   std::string normals = "smooth";
   std::uint32_t ambient_rays = 0;
-  std::string bricks;  ///< XxYxZ, or "active"
+  std::string bricks;          ///< XxYxZ, or "active"
+  bool names_picture = false;  ///< no output is asked for: the picture's name is default_image()
+  bool isovalue_suggested = false;  ///< none was given: the volume suggests one
 };
 
 void add_render_options(CLI::App &command, RenderArgs &options);
@@ -41,11 +43,14 @@ void add_render_options(CLI::App &command, RenderArgs &options);
 /// "#RRGGBB" -> [0,1]^3.
 std::array<float, 3> parse_color(const char *option, const std::string &text);
 
+/// Number of frames; as for one isovalue if there is none yet.
+std::size_t num_frames(const RenderArgs &options, std::size_t num_views);
 /// The name of a frame's file: the name as given for a single frame, else NAME_isoV_viewK.EXT.
 /// Empty for an empty name.
 std::filesystem::path frame_path(const std::filesystem::path &path, std::size_t num_views,
                                  const RenderArgs &options, double isovalue, std::size_t view);
-/// VOLUME_iso40.png in the current folder; frame_path() says the rest for several frames.
+/// VOLUME_iso40.png in the current folder, VOLUME.png if there is no isovalue yet; frame_path()
+/// says the rest for several frames.
 std::string default_image(const RenderArgs &options, std::size_t num_views);
 
 /// Whether a file was asked for.

@@ -149,6 +149,7 @@ nlohmann::ordered_json options_json(const RenderArgs &options, ImageSize size,
                                  {"samples", size.samples},
                                  {"views", num_views},
                                  {"isovalues", options.frame.isovalues},
+                                 {"isovalue_suggested", options.isovalue_suggested},
                                  {"voxel_error", options.frame.voxel_error},
                                  {"reference", options.reference}};
   if (!on_host) json.update(renderer_options_json(options.renderer));

@@ -18,6 +18,7 @@
 #include "core/stages/zfp_encode.hpp"
 #include "core/zfp/describe_compression.hpp"
 #include "core/zfp/isovalue.hpp"
+#include "core/zfp/isovalue_suggestions.hpp"
 #include "core/zfp/slabs.hpp"
 #include "core/zfp/zfp_accuracy.hpp"
 #include "tools/isowave/program.hpp"
@@ -171,6 +172,13 @@ void warn_of_header(const std::string &path, const RawOverrides &overrides) {
 
 void print_compression(const std::string &path, const CompressedVolume &volume) {
   if (!is_zfp_name(path)) fmt::print("compressed in memory: {}\n", describe_compression(volume));
+}
+
+double suggested_isovalue(const CompressedVolume &volume) {
+  const SuggestedIsovalue first = first_suggestion(volume, "--isovalue");
+  fmt::print("isovalue {} is suggested ({}); choose another with --isovalue\n", first.isovalue,
+             to_string(first.by));
+  return first.isovalue;
 }
 
 void warn_of_isovalue(const CompressedVolume &volume, double isovalue) {

@@ -72,6 +72,11 @@ void warn_of_header(const std::string &path, const RawOverrides &overrides);
 /// Prints how a volume was compressed that was not compressed yet.
 void print_compression(const std::string &path, const CompressedVolume &volume);
 
+/// The first suggested isovalue, which is printed (core/zfp/isovalue_suggestions.hpp).
+///
+/// Throws  Error: there is none; it asks for --isovalue
+double suggested_isovalue(const CompressedVolume &volume);
+
 /// Warns of an isovalue without a surface: see isovalue_notice().
 void warn_of_isovalue(const CompressedVolume &volume, double isovalue);
 

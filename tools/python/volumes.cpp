@@ -220,6 +220,9 @@ void add_volumes(nb::module_ &m) {
       .def("decode", &decode, "level"_a, "begin"_a, "end"_a, "step"_a)
       .def("sample", &sample, "max_voxels"_a)
       .def(
+          "suggested_isovalues", [](const PyVolume &v) { return v.volume->suggested_isovalues(); },
+          nb::call_guard<WithoutGil>())
+      .def(
           "save",
           [](const PyVolume &v, const std::filesystem::path &path) { v.volume->save(path); },
           "path"_a, nb::call_guard<WithoutGil>())

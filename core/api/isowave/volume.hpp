@@ -127,6 +127,11 @@ class Volume {
   /// Decodes blocks that are spread over the volume, for histograms: about max_voxels voxels, the
   /// same ones each time; all voxels if there are no more.
   std::vector<float> sample(std::uint64_t max_voxels) const;
+  /// Isovalues that are worth a first look, found in a sample of the blocks: the same ones each
+  /// time. Otsu's threshold, which divides the histogram, comes first; up to three values follow
+  /// where the mean gradient magnitude has a peak, the most prominent first. Empty if all voxels
+  /// have the same value, or none has data. Takes about as long as decoding 4 million voxels.
+  std::vector<double> suggested_isovalues() const;
   /// Writes a `.zfp` file to a temporary name and renames it.
   ///
   /// Throws  Error: the name does not end in .zfp, or the file cannot be written

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from isowave import _core
 from isowave._camera import Camera
-from isowave._checked import number, size_of
+from isowave._checked import Isovalue, number, size_of
 from isowave._compress import compression_options
 from isowave._image import Image
 from isowave._placed import Placed
@@ -66,6 +66,15 @@ class Processes:
             if text is not None:
                 raise _core.Error(f"rank {rank}: {text}")
         return result
+
+
+def given_isovalue(isovalue: Isovalue) -> float:
+    if isinstance(isovalue, str) and isovalue == "auto":
+        raise _core.Error(
+            "isovalue='auto': no process sees the whole volume: give a number; `isowave info` "
+            "suggests some"
+        )
+    return number("isovalue", isovalue)
 
 
 class BrickRenderer(Placed[_core.Renderer]):
@@ -150,7 +159,7 @@ class BrickRenderer(Placed[_core.Renderer]):
     def camera(self, isovalue: float, size: tuple[int, int] | None = None) -> Camera:
         """As Renderer.camera()."""
         value, (width, height) = self._processes.together(
-            lambda: (number("isovalue", isovalue), self.size if size is None else size_of(size))
+            lambda: (given_isovalue(isovalue), self.size if size is None else size_of(size))
         )
         return Camera(*self._core.camera(value, width, height))
 
@@ -183,7 +192,11 @@ class BrickRenderer(Placed[_core.Renderer]):
 
         def ask() -> Request:
             request = Request(
-                isovalue, camera, self.size if size is None else size, outputs=outputs, **more
+                given_isovalue(isovalue),
+                camera,
+                self.size if size is None else size,
+                outputs=outputs,
+                **more,
             )
             if "position" in request.outputs:
                 raise ValueError(f"outputs position: bricks have {', '.join(ALL_OUTPUTS)}")

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import operator
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
+
+Isovalue = float | Literal["auto"]  # "auto": the first of Volume.suggested_isovalues()
 
 
 def refuse(name: str, value: Any, wanted: str) -> TypeError:

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from isowave import _core
-from isowave._checked import number, whole
+from isowave._checked import Isovalue, number, whole
 from isowave._placed import Placed
 
 LARGEST_SAMPLE = 1 << 24  # voxels that a histogram is made of
@@ -106,6 +106,7 @@ class Voxels(Placed[_core.Volume]):
     def __init__(self, core: _core.Volume) -> None:
         self._core = core
         self._token = uuid.uuid4().hex
+        self._suggested: list[float] | None = None
 
     @property
     def size(self) -> int:
@@ -243,6 +244,27 @@ class Voxels(Placed[_core.Volume]):
             least, largest = float(values.min()), float(values.max())
         counts, edges = np.histogram(np.clip(values, least, largest), bins, (least, largest))
         return counts.astype(np.int64), edges.astype(np.float64)
+
+    def suggested_isovalues(self) -> list[float]:
+        """Isovalues that are worth a first look, found in a sample of at most 2^22 voxels.
+
+        Otsu's threshold, which divides the histogram, comes first. Up to three values follow where
+        the mean gradient magnitude has a peak, the most prominent first. The same ones each time;
+        [] if all voxels have the same value, or none has data.
+        """
+        if self._suggested is None:
+            self._suggested = self._core.suggested_isovalues()
+        return list(self._suggested)
+
+    def _isovalue(self, isovalue: Isovalue) -> float:
+        """A number as it is; "auto": the first suggestion. Raises Error if there is none."""
+        if not (isinstance(isovalue, str) and isovalue == "auto"):
+            return number("isovalue", isovalue)
+        if not self.suggested_isovalues():
+            raise _core.Error(
+                "isovalue='auto': all voxels have the same value, or none has data: give a number"
+            )
+        return self.suggested_isovalues()[0]
 
     def __repr__(self) -> str:
         shape = " x ".join(str(n) for n in self.shape)

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from isowave import _core
 from isowave._camera import Camera
-from isowave._checked import flag, number, refuse, size_of, whole
+from isowave._checked import Isovalue, flag, refuse, size_of, whole
 from isowave._image import Image
 from isowave._levels import Voxels
 from isowave._request import ALL_OUTPUTS, Color, Progress, Request, normals_of
@@ -170,11 +170,11 @@ class Renderer:
         """Waits until the device draws. Raises Error if its renderer cannot be made."""
         self._core.wait()
 
-    def camera(self, isovalue: float, size: tuple[int, int] | None = None) -> Camera:
+    def camera(self, isovalue: Isovalue, size: tuple[int, int] | None = None) -> Camera:
         """A view from the front right and above in which the isosurface fills the picture."""
         self._check_turn()
         picture_size = self.size if size is None else size_of(size)
-        return Camera(*self._core.camera(number("isovalue", isovalue), *picture_size))
+        return Camera(*self._core.camera(self.volume._isovalue(isovalue), *picture_size))
 
     def _check_turn(self) -> None:
         """Raises Error in the loop over passes(), whose frame keeps the renderer until it ends."""
@@ -183,7 +183,7 @@ class Renderer:
 
     def render(
         self,
-        isovalue: float,
+        isovalue: Isovalue,
         *,
         camera: Camera | None = None,
         size: tuple[int, int] | None = None,
@@ -206,7 +206,8 @@ class Renderer:
         Parameters
         ----------
         isovalue
-            The surface is where the trilinear field crosses this value.
+            The surface is where the trilinear field crosses this value. "auto": the first of
+            Volume.suggested_isovalues().
         camera
             None: the surface fills the picture.
         size
@@ -246,6 +247,7 @@ class Renderer:
             A request that the renderer was not made for, in one line. Later frames can be drawn.
         """
         arguments = {name: value for name, value in locals().items() if name != "self"}
+        arguments["isovalue"] = self.volume._isovalue(isovalue)
         return self.draw(Request(**arguments))
 
     def draw(self, request: Request) -> Image:
@@ -270,22 +272,21 @@ class Renderer:
         return replace(request, size=size, camera=camera)
 
     def cast_rays(
-        self, rays: npt.ArrayLike, isovalue: float, *, normals: str = "smooth"
+        self, rays: npt.ArrayLike, isovalue: Isovalue, *, normals: str = "smooth"
     ) -> dict[str, npt.NDArray[Any]]:
         """As Volume.cast_rays(), by this renderer. Needs rays=True."""
         self._check_turn()
         if not self._can["rays"]:
             raise _core.Error("cast_rays needs a renderer that was made with rays=True")
-        warn_of_isovalue(self._core, number("isovalue", isovalue))
+        value = self.volume._isovalue(isovalue)
+        warn_of_isovalue(self._core, value)
         try:
             array = np.ascontiguousarray(rays, np.float64)
         except (TypeError, ValueError):
             raise refuse("rays", rays, "numbers, (..., 6): origin, direction") from None
         if array.ndim == 0 or array.shape[-1] != 6:
             raise ValueError(f"rays of shape {array.shape}: the last axis has 6: origin, direction")
-        found = self._core.cast_rays(
-            array.reshape(-1, 6), number("isovalue", isovalue), normals_of(normals)
-        )
+        found = self._core.cast_rays(array.reshape(-1, 6), value, normals_of(normals))
         lead = array.shape[:-1]
         return {
             "t_hit": found["depth"].reshape(lead),
@@ -299,7 +300,7 @@ class Renderer:
         state = "" if self.ready else ", not ready"
         return f"<isowave.Renderer {width} x {height}, {self.device['name'] or 'host'}{state}>"
 
-    def passes(self, isovalue: float, **more: Any) -> Iterator[Image]:
+    def passes(self, isovalue: Isovalue, **more: Any) -> Iterator[Image]:
         """Yields the picture after each pass, and the finished one last; arguments as render().
 
         Pictures before the last have only rgb. The frame waits until the next picture is asked for,
@@ -331,7 +332,8 @@ class Renderer:
                 put(error)
             put(None)
 
-        request = self._completed(Request(isovalue, on_pass=on_pass, **more))
+        value = self.volume._isovalue(isovalue)
+        request = self._completed(Request(value, on_pass=on_pass, **more))
         thread = threading.Thread(target=draw, name="isowave passes", daemon=True)
         thread.start()
         try:

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from isowave import _core, viewer
-from isowave._checked import flag, function, number, reversed_axes, whole
+from isowave._checked import Isovalue, flag, function, reversed_axes, whole
 from isowave._camera import Camera
 from isowave._image import Image
 from isowave._levels import Voxels
@@ -96,7 +96,7 @@ class Volume(Voxels):
 
     def camera(
         self,
-        isovalue: float,
+        isovalue: Isovalue,
         *,
         size: tuple[int, int] = (1280, 720),
         device: str | int | None = None,
@@ -107,7 +107,7 @@ class Volume(Voxels):
 
     def render(
         self,
-        isovalue: float,
+        isovalue: Isovalue,
         *,
         size: tuple[int, int] = (1280, 720),
         camera: Camera | None = None,
@@ -124,7 +124,8 @@ class Volume(Voxels):
         Parameters
         ----------
         isovalue
-            The surface is where the trilinear field crosses this value.
+            The surface is where the trilinear field crosses this value. "auto": the first of
+            suggested_isovalues().
         size
             Width and height of the picture [pixels].
         camera
@@ -132,7 +133,7 @@ class Volume(Voxels):
         device, memory_budget
             As Renderer's.
         """
-        request = Request(isovalue, camera, size, **more)
+        request = Request(self._isovalue(isovalue), camera, size, **more)
         return self.draw(request, device=device, memory_budget=memory_budget)
 
     def draw(
@@ -192,7 +193,7 @@ class Volume(Voxels):
     def cast_rays(
         self,
         rays: npt.ArrayLike,
-        isovalue: float,
+        isovalue: Isovalue,
         *,
         normals: str = "smooth",
         device: str | int | None = None,
@@ -204,7 +205,8 @@ class Volume(Voxels):
         rays
             (..., 6): origin and direction, (x, y, z) in world space, as float64.
         isovalue
-            The surface is where the trilinear field crosses this value.
+            The surface is where the trilinear field crosses this value. "auto": the first of
+            suggested_isovalues().
         normals
             "smooth": central differences; "cell": gradients of the trilinear field itself.
         device
@@ -238,7 +240,7 @@ class Volume(Voxels):
 
     def extract(
         self,
-        isovalue: float,
+        isovalue: Isovalue,
         *,
         level: int = 0,
         normals: bool = True,
@@ -254,7 +256,8 @@ class Volume(Voxels):
         Parameters
         ----------
         isovalue
-            The surface is where the field crosses this value along edges between voxels.
+            The surface is where the field crosses this value along edges between voxels. "auto":
+            the first of suggested_isovalues().
         level
             Level of detail; 0: the volume itself. Each has half the voxels of the last along each
             axis.
@@ -275,10 +278,11 @@ class Volume(Voxels):
         """
         if vertices not in ("apart", "exact"):
             raise ValueError(f"vertices={vertices!r:.60}: there are apart and exact")
-        warn_of_isovalue(self._core, number("isovalue", isovalue))
+        value = self._isovalue(isovalue)
+        warn_of_isovalue(self._core, value)
         found = self._core.extract(
             "" if device is None else str(device),
-            number("isovalue", isovalue),
+            value,
             self._checked(level),
             flag("normals", normals),
             vertices == "exact",
@@ -290,7 +294,7 @@ class Volume(Voxels):
 
     def verify(
         self,
-        isovalue: float,
+        isovalue: Isovalue,
         *,
         size: tuple[int, int] = (640, 360),
         camera: Camera | None = None,
@@ -312,7 +316,7 @@ class Volume(Voxels):
             equal: whether all bits are the same; differing_pixels, differing_depths,
             differing_normals: how many differ; hits: how many rays hit the surface.
         """
-        request = Request(isovalue, camera, size)
+        request = Request(self._isovalue(isovalue), camera, size)
         if device is None and _core.draws_on_host(""):
             device = "cpu"
         if str(device).lower() == "host":

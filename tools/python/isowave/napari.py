@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from isowave._camera import Camera, vector
+from isowave._checked import Isovalue
 from isowave._compress import open
 from isowave._core import Error
 from isowave._image import Image
@@ -173,7 +174,7 @@ def open_with_levels(path: str) -> Volume:
 def add_isosurface(
     viewer: Any,
     volume: Volume,
-    isovalue: float,
+    isovalue: Isovalue,
     *,
     size: tuple[int, int] = (1280, 720),
     name: str = "isosurface",
@@ -191,7 +192,8 @@ def add_isosurface(
     viewer
         napari.Viewer, showing (z, y, x) in 3D.
     isovalue
-        The surface is where the trilinear field crosses this value.
+        The surface is where the trilinear field crosses this value. "auto": the first of
+        Volume.suggested_isovalues().
     size
         Width and height of the picture [pixels]: at best those of the viewer's canvas.
     name
@@ -204,6 +206,7 @@ def add_isosurface(
     ValueError
         The viewer does not show (z, y, x) in 3D, or no ray hits the surface.
     """
+    isovalue = volume._isovalue(isovalue)
     order = tuple(viewer.dims.order)  # two axes if the viewer is empty
     if viewer.dims.ndisplay != 3 or len(order) > 3 or order != tuple(sorted(order)):
         raise ValueError("the viewer does not show (z, y, x) in 3D: viewer.dims.ndisplay = 3")

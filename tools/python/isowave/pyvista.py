@@ -32,6 +32,7 @@ from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkImageData, vtkPolyDat
 from vtkmodules.vtkRenderingCore import vtkPolyDataMapper, vtkTexture
 
 from isowave._camera import Camera, vector
+from isowave._checked import Isovalue
 from isowave._image import Image
 from isowave._request import Color, Request
 from isowave._volume import Volume
@@ -166,7 +167,7 @@ class Isosurface:
 def add_isosurface(
     plotter: pyvista.Plotter,
     volume: Volume,
-    isovalue: float,
+    isovalue: Isovalue,
     *,
     color: Color | None = None,
     device: str | int | None = None,
@@ -191,7 +192,8 @@ def add_isosurface(
         Lies in the scene's world space. isowave.compress(pyvista.ImageData) lies where the image
         does.
     isovalue
-        The surface is where the trilinear field crosses this value.
+        The surface is where the trilinear field crosses this value. "auto": the first of
+        Volume.suggested_isovalues().
     color
         "#rrggbb", or red, green, blue from 0 to 1.
     device, memory_budget
@@ -210,7 +212,7 @@ def add_isosurface(
     ValueError.
     """
     request = Request(
-        isovalue,
+        volume._isovalue(isovalue),
         color=color,
         normals=normals,
         outputs=("rgb", "depth"),

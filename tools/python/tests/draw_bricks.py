@@ -56,6 +56,8 @@ def fails(name, work):
 
 
 fails("isovalue", lambda: renderer.render(40 + rank))
+fails("auto", lambda: renderer.render("auto"))
+fails("auto camera", lambda: renderer.camera("auto"))
 fails("camera", lambda: renderer.render(40, camera=camera if rank == 1 else None))
 fails("color", lambda: renderer.render(40, color="blue" if rank == 1 else None))
 fails("outputs", lambda: renderer.render(40, outputs=("position",)))

@@ -94,6 +94,8 @@ def test_bounds_of_the_error(drawn, levelled):
     ("case", "text"),
     [
         ("isovalue", "rank 1 has another request than rank 0"),
+        ("auto", "isovalue='auto': no process sees the whole volume: give a number"),
+        ("auto camera", "isovalue='auto': no process sees the whole volume: give a number"),
         ("camera", "some processes give a camera"),
         ("color", "color 'blue': give '#rrggbb'"),
         ("outputs", "outputs position: bricks have rgb, depth, normals, bounds"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from isowave.viewer.pictures import Extent, Stopped, count_rays, dividing_value, encode_png
+from isowave.viewer.pictures import Extent, Stopped, count_rays, encode_png
 from isowave.viewer.pictures import fit_size, share_within
 
 
@@ -42,10 +42,3 @@ def test_the_share_of_rays_within_a_bound() -> None:
     assert share_within(depth, bounds, 0.25) == 0.25
     assert share_within(depth, bounds, 1) == 0.5
     assert share_within(depth[:1], bounds[:1], 1) is None
-
-
-def test_the_dividing_value_is_between_two_peaks() -> None:
-    counts = [0, 9, 10, 9, 0, 0, 0, 0, 4, 5, 4, 0]
-    assert 4.0 <= dividing_value(counts, 0.0, 12.0) <= 8.0
-    assert dividing_value([0, 0], 1.0, 3.0) == 2.0
-    assert dividing_value([5], 1.0, 3.0) == 2.0

@@ -469,14 +469,6 @@ def test_the_device_overtakes_the_host() -> None:
     scene.close()
 
 
-def test_the_first_isovalue_divides_the_histogram() -> None:
-    clock, volume = Clock(), FakeVolume()
-    scene = make_scene(volume, clock, isovalue=None)
-    eye = Eye(scene)
-    assert 0 < eye.of_type("welcome")[0]["isovalue"] < 255
-    assert len(eye.of_type("histogram")[0]["counts"]) == 256
-
-
 def test_infinite_ranges_are_those_of_the_histogram() -> None:
     clock, volume = Clock(), FakeVolume(value_range=(float("-inf"), float("inf")))
     eye = Eye(make_scene(volume, clock))

@@ -56,6 +56,7 @@ class FakeVolume:
     """before_pass  called before each pass of each frame, in the thread that draws
     refuse       an error for a renderer with these options, or None
     on_host      the renderers are the host's, which have no limits
+    suggested    what suggested_isovalues() returns, unless it is to fail
     """
 
     passes: int = 3
@@ -72,10 +73,17 @@ class FakeVolume:
     max_error: float | None = 0.5
     num_levels: int = 1
     on_host: bool = False
+    suggested: tuple[float, ...] = (90.5, 180.5)
+    fail_suggesting: bool = False
 
     def isovalue_notice(self, isovalue: float) -> str:
         least, largest = self.value_range
         return "" if least < isovalue <= largest else f"isovalue {isovalue:g} is outside."
+
+    def suggested_isovalues(self) -> list[float]:
+        if self.fail_suggesting:
+            raise RuntimeError("the file is shorter than it was")
+        return list(self.suggested)
 
     def histogram(self, bins: int = 256) -> tuple[NDArray[Any], NDArray[Any]]:
         """The share of space between two radii, as a ball has it."""

@@ -25,7 +25,7 @@ def view(
     notebook  whether to make a widget; None: if a Jupyter kernel runs and anywidget is installed
     block     in a browser: whether to wait until Ctrl-C, and then return None; None: unless Python
               is interactive
-    options   isovalue     first isovalue; None: the one that divides the histogram best
+    options   isovalue     first isovalue; None, "auto": the first of Volume.suggested_isovalues()
               device, memory_budget [bytes], size (width, height) [pixels], samples: as for Renderer
               title        text above the picture
               max_clients  most clients at the same time

@@ -68,7 +68,12 @@ def make_parser() -> argparse.ArgumentParser:
     )
     add = parser.add_argument
     add("volume", help="file of any format that isowave reads, or generate:...")
-    add("-i", "--isovalue", type=float, help="first isovalue [divides the histogram best]")
+    add(
+        "-i",
+        "--isovalue",
+        type=float,
+        help="first isovalue [the first that `isowave info` suggests]",
+    )
     add("--device", help="host, or a device: index, gpu, cpu, a part of its name [gpu, else host]")
     add("--memory-budget", type=_argument(parse_bytes), help="most memory to draw: 600MB, 1GiB")
     add("--size", type=_argument(parse_size), default=(1920, 1080), help="largest picture")

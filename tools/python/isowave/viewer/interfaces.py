@@ -108,6 +108,9 @@ class VolumeLike(Protocol):
     def isovalue_notice(self, isovalue: float) -> str:
         ...
 
+    def suggested_isovalues(self) -> list[float]:
+        ...
+
     def histogram(self, bins: int = 256) -> tuple[NDArray[Any], NDArray[Any]]:
         ...
 

@@ -1,10 +1,10 @@
-"""Sizes, encodings and first isovalues: what the scene computes without a renderer."""
+"""Sizes and encodings: what the scene computes without a renderer."""
 
 from __future__ import annotations
 
 import io
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -65,26 +65,6 @@ def fit_size(size: tuple[int, int], samples: int, max_rays: int) -> tuple[int, i
     # A side of one pixel cannot become smaller: the other one makes up for it.
     limit = max(1, max_rays // (samples * samples))
     return max(1, min(width, limit // height)), max(1, min(height, limit))
-
-
-def dividing_value(counts: Sequence[int], low: float, high: float) -> float:
-    """The value that divides a histogram into two classes of the least variance (Otsu 1979).
-
-    counts  of equally wide bins from low to high
-    """
-    weights = np.asarray(counts, np.float64)
-    edges = np.linspace(low, high, len(weights) + 1)
-    middles = (edges[:-1] + edges[1:]) / 2
-    below, above = np.cumsum(weights)[:-1], np.cumsum(weights[::-1])[::-1][1:]
-    sums = np.cumsum(weights * middles)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        between = below * above * (sums[:-1] / below - (sums[-1] - sums[:-1]) / above) ** 2
-    between = np.where(np.isfinite(between), between, -1.0)
-    if len(between) == 0 or between.max() <= 0:
-        return float((low + high) / 2)
-    # An empty stretch divides equally well anywhere: its middle is farthest from both classes.
-    best = np.flatnonzero(between >= between.max() * (1 - 1e-12))
-    return float((edges[best[0] + 1] + edges[best[-1] + 1]) / 2)
 
 
 def share_within(

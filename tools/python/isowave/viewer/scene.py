@@ -25,10 +25,12 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from isowave._checked import Isovalue
+
 from . import messages
 from .interfaces import ImageLike, ProgressLike, RendererLike, VolumeLike
 from .jpeg import encode_jpeg
-from .pictures import Extent, Stopped, dividing_value, encode_png, share_within
+from .pictures import Extent, Stopped, encode_png, share_within
 from .protocol import MAX_FLOAT32, MAX_RAYS, Ack, Budget, Message, Wish
 from .renderers import MakeHost, RendererOptions, Renderers, make_host
 from .turns import Client, Frame, Post, Stage, Turns
@@ -47,7 +49,7 @@ TOO_MANY_BUDGETS: Final = "the memory budget was changed too often: try again in
 class Scene:
     """A volume's renderer and those who look at it.
 
-    isovalue       at first; None: the one that divides the histogram best
+    isovalue       at first; None, "auto": the first of Volume.suggested_isovalues()
     device         as in isowave.Renderer
     memory_budget  as in isowave.Renderer
     size, samples  the largest picture that the renderer is made for at first; it is made anew when
@@ -67,7 +69,7 @@ class Scene:
         self,
         volume: VolumeLike,
         *,
-        isovalue: float | None = None,
+        isovalue: Isovalue | None = None,
         title: str = "",
         device: str | None = None,
         memory_budget: int | None = None,
@@ -79,6 +81,8 @@ class Scene:
         clock: Callable[[], float] = time.monotonic,
         start: bool = True,
     ) -> None:
+        if isovalue == "auto":
+            isovalue = None
         if isovalue is not None and not abs(isovalue) <= MAX_FLOAT32:
             raise ValueError(f"isovalue {isovalue}: give a number that is finite in float32")
         for name, limit in (("max_clients", max_clients), ("max_rays", max_rays)):
@@ -428,18 +432,26 @@ class Scene:
     def _prepare(self) -> None:
         low, high = (float(v) for v in self._volume.value_range)
         known = math.isfinite(low) and math.isfinite(high)
-        if self._isovalue is None or not known:
-            self._make_histogram()
         if known:
             self._range = low, high
+        else:
+            self._make_histogram()
         if self._isovalue is None:
-            self._isovalue = (self._range[0] + self._range[1]) / 2
-            if self._histogram is not None:
-                self._isovalue = dividing_value(self._histogram["counts"], *self._range)
+            self._isovalue = self._first_isovalue()
         with self._changed:
             self._prepared = True
             for client in list(self._turns.clients):
                 self._welcome(client)
+
+    def _first_isovalue(self) -> float:
+        """Any value of the range draws something for a person to start from."""
+        try:
+            suggested = self._volume.suggested_isovalues()
+        except Exception as error:
+            with self._changed:
+                self._broadcast(messages.error(error, None))
+            suggested = []
+        return suggested[0] if suggested else (self._range[0] + self._range[1]) / 2
 
     def _welcome(self, client: Client) -> None:
         client.post(messages.welcome(self._volume, self._title, self._range, self._isovalue), None)
