@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from viewer_fakes import FakeVolume
-from viewer_scenes import Clock, Eye, make_scene
+from viewer_scenes import Clock, Eye, make_scene, run
 
 import isowave
 
@@ -76,8 +76,10 @@ def test_other_texts_are_no_isovalues(volume):
 def test_the_first_isovalue_is_suggested() -> None:
     none, failing = FakeVolume(suggested=()), FakeVolume(fail_suggesting=True)
     for volume, expected in ((FakeVolume(), 90.5), (none, 127.5), (failing, 127.5)):
-        eye = Eye(make_scene(volume, Clock(), isovalue=None))
+        scene = make_scene(volume, Clock(), isovalue=None)
+        eye = Eye(scene)
         assert eye.of_type("welcome")[0]["isovalue"] == expected
+        run(scene)
         assert len(eye.of_type("histogram")[0]["counts"]) == 256
     auto = Eye(make_scene(FakeVolume(), Clock(), isovalue="auto"))
     assert auto.of_type("welcome")[0]["isovalue"] == 90.5
