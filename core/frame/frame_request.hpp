@@ -55,7 +55,7 @@ struct FrameRequest {
   /// With max_surface_error: views of which most pixels are to keep it together, so that all of
   /// them are drawn with the same detail, which is chosen once. Empty: this view alone.
   std::vector<Camera> series{};
-  /// Time in which the largest picture possible is drawn, small pictures first.
+  /// Time in which the largest picture possible is drawn (timed_renderer.hpp).
   std::optional<double> time_budget_ms{};
   OnPass on_pass{};
 };

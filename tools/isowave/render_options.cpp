@@ -248,10 +248,9 @@ void add_render_options(CLI::App &command, RenderArgs &options) {
       "--error-map", options.error_map,
       "float32 .npy [H,W] for --max-surface-error: the bound of each pixel, or ray; inf: there "
       "is none");
-  command.add_option(
-      "--time-budget", options.time_budget,
-      "time for each frame [ms]: draws small pictures by coarse levels of detail first, then "
-      "larger ones, as long as there is time");
+  command.add_option("--time-budget", options.time_budget,
+                     "time for each frame [ms]: draws a small picture first, if need be, then "
+                     "larger ones, as long as there is time");
   command.add_option("--refined", options.refined,
                      "PNG for --time-budget: the whole picture, drawn afterwards");
   command.add_option("--stats", options.stats, "file for JSON statistics of every frame and pass");

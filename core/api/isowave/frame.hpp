@@ -93,8 +93,8 @@ struct FrameRequest {
   /// the same series and error are drawn with the same detail, which is chosen for the first of
   /// them. Empty: the request's view alone.
   std::vector<Camera> series{};
-  /// Time in which the largest picture possible is drawn, small pictures first. Needs
-  /// with_time_budget.
+  /// Time in which the largest picture possible is drawn: first one that took at most half of it
+  /// before, then larger ones. Needs with_time_budget.
   std::optional<double> time_budget_ms{};
 
   // Arrays that the frame brings to the host.
