@@ -407,6 +407,14 @@ TEST(CliRender, MaxErrorBySample) {
   EXPECT_EQ(coarse["tries"][0]["within"], 1.0);
   EXPECT_EQ(error_of("0.00001")["chosen"], json({{"voxel_pixels", 0.0}, {"voxel_error", 0.0}}));
 
+  // All views have the same detail.
+  const auto views = render(volume + "--orbit 3 --rate 8 --by sample --max-surface-error 4 -o " +
+                            quoted(folder / "c.png"));
+  const std::string again = "chosen for all views";
+  const std::size_t second = views.out.find(again), third = views.out.find(again, second + 1);
+  EXPECT_LT(views.out.find("chosen in "), second) << views.out;
+  EXPECT_NE(third, std::string::npos) << views.out;
+
   const std::string command = "render " + volume + " -o " + quoted(folder / "b.png") + " ";
   test::expect_one_line_error(command + "--max-surface-error 1 --by nonsense", "--by");
   test::expect_one_line_error(command + "--by sample", "--by sample needs --max-surface-error");

@@ -85,7 +85,7 @@ class Request:
             "outputs": outputs,
             "max_error": optional("max_error", self.max_error),
             "by": evidence_of(self.by),
-            "series": tuple(camera_of(camera) for camera in self.series),
+            "series": series_of(self.series),
             "voxel_pixels": number("voxel_pixels", self.voxel_pixels),
             "voxel_error": number("voxel_error", self.voxel_error),
             "time_budget": optional("time_budget", self.time_budget),
@@ -160,6 +160,12 @@ def camera_of(camera: Any) -> Camera:
         number("Camera.fovy", camera.fovy),
         optional("Camera.parallel_height", camera.parallel_height),
     )
+
+
+def series_of(series: Any) -> tuple[Camera, ...]:
+    if not isinstance(series, Sequence):
+        raise refuse("series", series, "a list of cameras")
+    return tuple(camera_of(camera) for camera in series)
 
 
 def camera_for_core(camera: Camera) -> dict[str, Any]:

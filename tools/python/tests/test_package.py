@@ -393,6 +393,16 @@ def test_an_error_is_kept_by_sample():
     assert 299 <= detail["within"] <= detail["sampled_hits"] <= detail["sampled_rays"] == 64 * 48
     with pytest.raises(isowave.Error, match="give max_surface_error"):
         volume.render(10, size=SIZE, by="sample")
+    series = isowave.Camera.orbit(volume, 3)
+    renderer = volume.renderer(size=SIZE, levels=True, device="host")
+    shared = [
+        renderer.render(10, camera=camera, series=series, max_error=1.0, by="sample")
+        for camera in series
+    ]
+    first, *others = (each.statistics["detail"] for each in shared)
+    assert others == [first, first]
+    with pytest.raises(isowave.Error, match="give max_surface_error"):
+        renderer.render(10, series=series)
 
 
 def test_bad_requests_are_one_line(volume, renderer):

@@ -34,6 +34,7 @@ def test_arguments_reach_the_request_by_their_names(monkeypatch: pytest.MonkeyPa
         "outputs": ("rgb", "bounds"),
         "max_error": 1.0,
         "by": "sample",
+        "series": (CAMERA, CAMERA),
         "voxel_pixels": 2.0,
         "voxel_error": 3.0,
         "time_budget": 4.0,
@@ -61,6 +62,16 @@ def test_arguments_reach_the_request_by_their_names(monkeypatch: pytest.MonkeyPa
         "voxel_error": 3,
         "max_surface_error": 1,
         "by": "sample",
+        "series": 2
+        * [
+            {
+                "eye": (0, 0, 5),
+                "at": (0, 0, 0),
+                "up": (0, 1, 0),
+                "fovy_degrees": 45,
+                "parallel_height": None,
+            }
+        ],
         "time_budget_ms": 4000,
         "ambient_rays": 5,
         "want_picture": True,
@@ -91,6 +102,8 @@ def test_values_are_python_s_own() -> None:
     [
         ("isovalue", "80", "isovalue='80': give a number"),
         ("camera", (0, 0, 5), "camera=(0, 0, 5): give an isowave.Camera"),
+        ("series", 3, "series=3: give a list of cameras"),
+        ("series", [3], "camera=3: give an isowave.Camera"),
         ("camera", isowave.Camera((0, 0), (0, 0, 0)), "Camera.eye=(0, 0): give 3 numbers"),
         ("size", 64, "size=64: give width and height"),
         ("samples", 1.5, "samples=1.5: give a whole number"),
