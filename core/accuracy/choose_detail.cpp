@@ -63,7 +63,7 @@ void add_blocks(std::span<const float> depth, std::span<const FrameParams> frame
   }
 }
 
-/// At most so many views of a series are looked at.
+/// Most views of a series that are looked at.
 constexpr std::size_t kSeriesViews = 4;
 /// The views that detail is chosen for, spread evenly over a series.
 std::vector<Camera> views_of(const FrameRequest &request, std::span<const Camera> series) {

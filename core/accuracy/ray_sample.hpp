@@ -34,8 +34,8 @@ struct SeenFrame {
 /// camera  of that frame
 SeenFrame seen_frame(Renderer &renderer, const Camera &camera);
 
-/// Cameras whose frames show what is at most so many pixels beside a camera's rays. The first one
-/// is the camera, the others' rays pass in eight directions, so many pixels away and half as many.
+/// The camera, and sixteen more that see what is beside its rays: in eight directions, so many
+/// pixels away and half as far.
 std::vector<Camera> cameras_beside(const Camera &camera, std::uint32_t height, double pixels);
 
 /// Compares the hits of a sample's rays.
@@ -50,12 +50,11 @@ std::vector<Camera> cameras_beside(const Camera &camera, std::uint32_t height, d
 /// all of these hits or farther. So silhouettes may move by `limit`, too. Does not set `lowest`.
 SampledShare compare_hits(const Camera &camera, ImageSize size, std::span<const SeenFrame> finest,
                           std::span<const SeenFrame> other, double limit);
-/// A surface that rays graze is found by its tangent planes, within so many times the error.
+/// A hit's tangent plane stands for its surface up to so many times the error away.
 inline constexpr double kGrazing = 16;
 
-/// Lower end of the one-sided Clopper-Pearson interval of confidence kConfidence: the smallest
-/// share for which it is not improbable (1 - kConfidence) that so many rays or more are within the
-/// error.
+/// Lower end of the one-sided Clopper-Pearson interval, of confidence kConfidence, for the share of
+/// all rays that are within the error.
 double lowest_share(std::uint64_t num_within, std::uint64_t num_hits);
 
 /// Whether that lower end is at least kSampledShare. Takes 299 hits or more.

@@ -52,8 +52,8 @@ struct FrameRequest {
   /// sample that of full detail.
   std::optional<double> max_surface_error{};
   Evidence by = Evidence::kProof;  ///< for max_surface_error; kProof without one
-  /// With max_surface_error: views of which most pixels are to keep it together, so that all of
-  /// them are drawn with the same detail, which is chosen once. Empty: this view alone.
+  /// Views that share max_surface_error: most pixels of all of them together keep it. They are
+  /// drawn with one detail, which is chosen once. Empty: this view alone.
   std::vector<Camera> series{};
   /// Time in which the largest picture possible is drawn (timed_renderer.hpp).
   std::optional<double> time_budget_ms{};

@@ -89,9 +89,9 @@ struct FrameRequest {
   /// needs with_levels.
   std::optional<double> max_surface_error{};
   Evidence by = Evidence::kProof;  ///< for max_surface_error; kProof without one
-  /// With max_surface_error: views of which most pixels are to keep it together. All requests with
-  /// the same series and error are drawn with the same detail, which is chosen for the first of
-  /// them. Empty: the request's view alone.
+  /// Views that share max_surface_error: most pixels of all of them together keep it. Requests with
+  /// the same series and error are drawn with one detail, which is chosen once. Empty: the
+  /// request's view alone.
   std::vector<Camera> series{};
   /// Time in which the largest picture possible is drawn: first one that took at most half of it
   /// before, then larger ones. Needs with_time_budget.
