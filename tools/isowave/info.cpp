@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <limits>
 #include <memory>
+#include <new>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
@@ -100,7 +101,12 @@ Description describe_zfp(const std::string &path, const RawOverrides &overrides,
   }
   if (known_voxel_error(volume)) result["errors"] = "stated";
   if (no_scan) return {result};
-  return {result, suggest_isovalues(open_compressed_volume(path, overrides))};
+  try {
+    return {result, suggest_isovalues(open_compressed_volume(path, overrides))};
+  } catch (const std::bad_alloc &) {  // the index of a stream that has none
+    result["isovalues"] = "not known: finding the blocks needs more memory";
+    return {result};
+  }
 }
 
 void read(VolumeReader &reader, std::uint32_t z, std::uint32_t num_layers, std::span<float> out) {
