@@ -23,6 +23,13 @@ def test_its_fields_are_the_arguments_of_render() -> None:
     assert fields[1:] == arguments[1:]
 
 
+class Volume:
+    """One whose isovalues are all numbers."""
+
+    def _isovalue(self, isovalue: float) -> float:
+        return isovalue
+
+
 def test_arguments_reach_the_request_by_their_names(monkeypatch: pytest.MonkeyPatch) -> None:
     given: dict[str, Any] = {
         "camera": CAMERA,
@@ -43,7 +50,9 @@ def test_arguments_reach_the_request_by_their_names(monkeypatch: pytest.MonkeyPa
     }
     assert [*given] == [field.name for field in dataclasses.fields(Request)][1:]
     monkeypatch.setattr(isowave.Renderer, "draw", lambda self, request: request)
-    request: Any = isowave.Renderer.render(object.__new__(isowave.Renderer), 80, **given)
+    renderer = object.__new__(isowave.Renderer)
+    monkeypatch.setattr(renderer, "volume", Volume(), raising=False)
+    request: Any = renderer.render(80, **given)
     assert {field: getattr(request, field) for field in given} == given
     assert request.for_core() == {
         "eye": (0, 0, 5),
