@@ -46,15 +46,15 @@ FrameStatistics public_statistics(const core::FrameStats &stats, std::uint64_t n
   return result;
 }
 
+core::Camera core_camera(const Camera &camera) {
+  return {to_glm(camera.eye), to_glm(camera.at), to_glm(camera.up), camera.fovy_degrees,
+          camera.parallel_height};
+}
+
 }  // namespace
 
 core::ImageSize core_size(const ImageSize &size) {
   return {size.width, size.height, size.samples};
-}
-
-core::Camera core_camera(const Camera &camera) {
-  return {to_glm(camera.eye), to_glm(camera.at), to_glm(camera.up), camera.fovy_degrees,
-          camera.parallel_height};
 }
 
 Camera public_camera(const core::Camera &camera) {

@@ -99,7 +99,7 @@ struct DetailChoice {
     double kept = 0;
   };
   std::vector<Try> tries;
-  double total_ms = 0;
+  double total_ms = 0;  ///< of choosing; 0: a series had been chosen for
 };
 
 /// Statistics of a frame.

@@ -92,7 +92,7 @@ bool finite(const glm::dvec3 &v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
-/// A vector of so many pixels in the picture's plane.
+/// The vector `pixels`, to the right and up in the picture, in world axes [pixels].
 glm::dvec3 in_picture(const Camera &camera, const glm::dvec2 &pixels) {
   const glm::dvec3 forward = camera.at - camera.eye,
                    right = glm::normalize(glm::cross(forward, camera.up)),

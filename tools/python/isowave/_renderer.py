@@ -227,8 +227,8 @@ class Renderer:
             "sample": 99 % of the hits keep it, against full detail, as some rays show. Needs
             levels=True; see statistics["detail"].
         series
-            Views of which most hits are to keep max_error together, such as those of a movie: all
-            frames with the same series have the same detail, which is chosen once.
+            Views that share max_error, such as those of a movie: most hits of all of them together
+            keep it. Frames with the same series have one detail, which is chosen once.
         voxel_pixels
             Largest distance between voxels of coarser levels [pixels]; 0: none. Needs levels=True.
         voxel_error
