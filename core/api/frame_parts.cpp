@@ -72,6 +72,9 @@ core::FrameRequest core_request(const FrameRequest &request, const core::Compres
   result.camera = core_camera(request.camera);
   result.isovalue = core::drawn_isovalue(volume, request.isovalue);
   result.size = core_size(request.size);
+  for (const ClipPlane &plane : request.clip)
+    result.clip.planes.push_back({to_glm(plane.normal), plane.offset});
+  result.clip.caps = request.caps;
   result.voxel_pixels = request.voxel_pixels;
   result.voxel_error = request.voxel_error;
   result.bound = static_cast<core::FieldBound>(request.bound);
@@ -95,6 +98,8 @@ void check_wanted(const FrameRequest &request, const core::Abilities &abilities)
     throw core::Error("a picture within a time has no bounds of its error: leave out want_bounds");
   if (request.bound != FieldBound::kNone)
     throw core::Error("the surface of a bound has no error: draw the volume itself");
+  if (!request.clip.empty())
+    throw core::Error("errors are bounded of whole surfaces: leave out clip, or want_bounds");
   if (!abilities.bounds) {
     throw core::Error(
         "this renderer knows no bounds of the error: leave out want_bounds, or draw on the host, "
@@ -136,6 +141,9 @@ std::string text_of(const FrameRequest &request) {
     if constexpr (std::is_same_v<Field, std::vector<Camera>>) {
       add(field.size());
       for (const Camera &camera : field) for_each_camera_field(camera, visit);
+    } else if constexpr (std::is_same_v<Field, std::vector<ClipPlane>>) {
+      add(field.size());
+      for (const ClipPlane &plane : field) for_each_plane_field(plane, visit);
     } else {
       visit(name, field);
     }

@@ -219,6 +219,17 @@ core::Image8 image_of(const Frame &frame) {
 
 }  // namespace
 
+std::array<ClipPlane, 6> box_planes(const Vector3 &begin, const Vector3 &end) {
+  return guarded("making a box", [&] {
+    std::array<ClipPlane, 6> planes;
+    std::ranges::transform(core::box_planes(to_glm(begin), to_glm(end)), planes.begin(),
+                           [](const core::ClipPlane &plane) -> ClipPlane {
+                             return {from_glm(plane.normal), plane.offset};
+                           });
+    return planes;
+  });
+}
+
 void save_png(const Frame &frame, const std::filesystem::path &path) {
   guarded("saving a picture", [&] {
     core::check_png_name(path);

@@ -9,6 +9,7 @@
 #include "core/frame/frame_stats.hpp"
 #include "core/frame/normals.hpp"
 #include "core/view/camera.hpp"
+#include "core/view/clip.hpp"
 #include "core/view/frame.hpp"
 #include "core/zfp/level_bounds.hpp"
 
@@ -31,6 +32,7 @@ enum class Evidence {
 struct FrameRequest {
   Camera camera{};
   float isovalue = 0;
+  Clip clip{};                      ///< the part of the volume that is drawn
   std::optional<ImageSize> size{};  ///< none: the renderer's largest
   /// Largest distance between voxels of a coarser level of detail [pixels], see
   /// make_level_frames(); 0: the finest level draws all.

@@ -13,6 +13,8 @@ namespace {
 
 /// Checks settings that either the renderer or the user may choose, not both.
 void check_choices(const FrameRequest &request) {
+  if (!request.clip.planes.empty() && request.bound != FieldBound::kNone)
+    throw Error("a bound of the field is drawn whole: leave out clip");
   if (!request.max_surface_error) {
     if (request.by == Evidence::kSample)
       throw Error("a sample is evidence for max_surface_error: give max_surface_error");
@@ -26,6 +28,8 @@ void check_choices(const FrameRequest &request) {
     throw Error("max_surface_error chooses the detail: leave out voxel_pixels and voxel_error");
   if (request.bound != FieldBound::kNone)
     throw Error("the surface of a bound has no error: draw the volume itself");
+  if (!request.clip.planes.empty() && request.by == Evidence::kProof)
+    throw Error("errors are proven of whole surfaces: leave out clip, or judge by sample");
 }
 
 }  // namespace
@@ -46,6 +50,7 @@ void check(const FrameRequest &request, const Abilities &abilities) {
   check_voxel_pixels(request.voxel_pixels);
   with_fewer_planes({}, request.voxel_error);  // or throws
   check_ambient_rays(request.ambient_rays);
+  check_clip(request.clip);
   if (request.max_surface_error) check_max_surface_error(*request.max_surface_error);
   if (request.time_budget_ms) check_time_budget(*request.time_budget_ms);
   check_choices(request);
@@ -58,6 +63,8 @@ void check(const FrameRequest &request, const Abilities &abilities) {
   };
   need(request.camera.parallel_height.has_value(), abilities.parallel,
        "this renderer draws in perspective alone: leave out parallel projection");
+  need(!request.clip.planes.empty(), abilities.clipping,
+       "this renderer draws whole volumes alone: leave out clip");
   need(request.voxel_pixels > 0, abilities.levels,
        "this renderer draws the finest level of detail alone: leave out voxel_pixels, or draw a "
        "volume with levels on the host, or on a device by a renderer that was made with_levels");

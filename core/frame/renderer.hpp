@@ -33,6 +33,7 @@ struct Abilities {
   bool time_budget = false;        ///< FrameRequest::time_budget_ms
   bool kept_picture = false;       ///< keep_picture(), fill_from_kept(), enlarge_kept()
   bool parallel = true;            ///< Camera::parallel_height
+  bool clipping = false;           ///< FrameRequest::clip
   Solver solver = kDefaultSolver;  ///< the root finder
 };
 

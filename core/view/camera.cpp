@@ -94,13 +94,17 @@ bool finite(const glm::dvec3 &v) {
 
 /// The vector `pixels`, to the right and up in the picture, in world axes [pixels].
 glm::dvec3 in_picture(const Camera &camera, const glm::dvec2 &pixels) {
-  const glm::dvec3 forward = camera.at - camera.eye,
-                   right = glm::normalize(glm::cross(forward, camera.up)),
-                   up = glm::normalize(glm::cross(right, forward));
-  return pixels.x * right + pixels.y * up;
+  const CameraAxes axes = axes_of(camera);
+  return pixels.x * axes.right + pixels.y * axes.up;
 }
 
 }  // namespace
+
+CameraAxes axes_of(const Camera &camera) {
+  const glm::dvec3 forward = glm::normalize(camera.at - camera.eye),
+                   right = glm::normalize(glm::cross(forward, camera.up));
+  return {forward, right, glm::cross(right, forward)};
+}
 
 void check_camera(const Camera &camera, std::string_view what) {
   if (!finite(camera.eye) || !finite(camera.at) || !finite(camera.up)) {

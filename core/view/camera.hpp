@@ -38,6 +38,12 @@ CameraFile read_camera_file(const std::filesystem::path &path);
 /// Throws  Error: the camera is degenerate (see read_camera_file); `what` names it
 void check_camera(const Camera &camera, std::string_view what);
 
+/// Directions of length 1, at right angles to each other, in world space.
+struct CameraAxes {
+  glm::dvec3 forward, right, up;
+};
+CameraAxes axes_of(const Camera &camera);
+
 /// The camera, moved around what it looks at, about the axis `up`.
 Camera turned(const Camera &camera, double degrees);
 /// The camera, whose rays all pass beside its own: turned about its eye, or moved in parallel

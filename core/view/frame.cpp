@@ -143,12 +143,10 @@ View make_view(const VolumeInfo &info, const Camera &camera, ImageSize size) {
 
   const glm::dmat3 world_to_index = glm::inverse(info.index_to_world());
   const glm::dvec3 eye = world_to_index * (camera.eye - info.origin);
-  const glm::dvec3 world_fwd = glm::normalize(camera.at - camera.eye);
-  const glm::dvec3 world_right = glm::normalize(glm::cross(world_fwd, camera.up));
-  const glm::dvec3 world_up = glm::cross(world_right, world_fwd);
-  glm::dvec3 fwd = world_to_index * world_fwd;
-  glm::dvec3 right = world_to_index * world_right;
-  glm::dvec3 up = world_to_index * world_up;
+  const CameraAxes axes = axes_of(camera);
+  glm::dvec3 fwd = world_to_index * axes.forward;
+  glm::dvec3 right = world_to_index * axes.right;
+  glm::dvec3 up = world_to_index * axes.up;
   if (!std::isfinite(largest_component(eye)) || largest_component(eye) > 1e7) {
     throw Error(
         "the camera's eye is {:.3g} voxels from the volume's origin: up to 1e7 can be drawn in "

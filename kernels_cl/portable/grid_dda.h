@@ -52,8 +52,12 @@ typedef struct RayAxis {
   float origin;    ///< where regions count from, see BrickPlace
 } RayAxis;
 
+#define ISO_NOT_CUT (-1)
+
 typedef struct Ray {
   RayAxis x, y, z;
+  float begin_t, end_t;  ///< the part of it that is drawn; only read if ISO_INTERVALS is 1
+  int cut_by;            ///< the clipping plane at which it begins, or ISO_NOT_CUT
 } Ray;
 
 /// A crossing of a plane of `axis` (0..2), or where the ray starts, or is cut.
@@ -129,26 +133,42 @@ ISO_INLINE int twice_v(const View *view, int row) {
   return (int)(view->stride * view->height) - 1 - 2 * row;
 }
 
-/// The ray of a pixel (row-major, row 0 at the top). Its direction is (fwd + u right + v up) /
-/// sqrt(1 + u^2 + v^2), mapped to index space; t * frame->view.t_scale is the distance from the eye
-/// in world units. A parallel ray's direction is fwd; its distance is that from the eye's plane.
+/// A ray in the axes of the camera: fwd + u right + v up.
+typedef struct RayOfView {
+  float u, v;
+  float length;  ///< sqrt(1 + u^2 + v^2)
+} RayOfView;
+
+/// The ray of a pixel (row-major, row 0 at the top).
+ISO_INLINE RayOfView ray_of_view(const View *view, uint pixel) {
+  const RayPlace place = place_of_ray(view, (int)(pixel % view->width), (int)(pixel / view->width));
+  RayOfView r;
+  r.u = (float)twice_u(view, place.column) * view->pixel_scale;
+  r.v = (float)twice_v(view, place.row) * view->pixel_scale;
+  r.length = sqrt(fma(r.u, r.u, fma(r.v, r.v, 1.0f)));
+  return r;
+}
+
+/// The ray of a pixel. Its direction is (fwd + u right + v up) / sqrt(1 + u^2 + v^2), mapped to
+/// index space; t * frame->view.t_scale is the distance from the eye in world units. A parallel
+/// ray's direction is fwd; its distance is that from the eye's plane. Its interval is the frame's
+/// band.
 ISO_INLINE Ray make_ray(const FrameParams *frame, uint pixel) {
-  const RayPlace place = place_of_ray(&frame->view, (int)(pixel % frame->view.width),
-                                      (int)(pixel / frame->view.width));
+  const RayOfView view = ray_of_view(&frame->view, pixel);
   const uint is_parallel = frame->view.is_parallel;
-  const float u = (float)twice_u(&frame->view, place.column) * frame->view.pixel_scale;
-  const float v = (float)twice_v(&frame->view, place.row) * frame->view.pixel_scale;
-  const float length = sqrt(fma(u, u, fma(v, v, 1.0f)));
   Ray r;
-  r.x = make_camera_axis(is_parallel, u, v, length, frame->view.eye_x, frame->view.fwd_x,
-                         frame->view.right_x, frame->view.up_x);
-  r.y = make_camera_axis(is_parallel, u, v, length, frame->view.eye_y, frame->view.fwd_y,
-                         frame->view.right_y, frame->view.up_y);
-  r.z = make_camera_axis(is_parallel, u, v, length, frame->view.eye_z, frame->view.fwd_z,
-                         frame->view.right_z, frame->view.up_z);
+  r.x = make_camera_axis(is_parallel, view.u, view.v, view.length, frame->view.eye_x,
+                         frame->view.fwd_x, frame->view.right_x, frame->view.up_x);
+  r.y = make_camera_axis(is_parallel, view.u, view.v, view.length, frame->view.eye_y,
+                         frame->view.fwd_y, frame->view.right_y, frame->view.up_y);
+  r.z = make_camera_axis(is_parallel, view.u, view.v, view.length, frame->view.eye_z,
+                         frame->view.fwd_z, frame->view.right_z, frame->view.up_z);
   r.x.origin = frame->brick.origin_x;
   r.y.origin = frame->brick.origin_y;
   r.z.origin = frame->brick.origin_z;
+  r.begin_t = ISO_BANDS ? frame->band.begin_t : 0.0f;
+  r.end_t = ISO_BANDS ? frame->band.end_t : INFINITY;
+  r.cut_by = ISO_NOT_CUT;
   return r;
 }
 
@@ -158,6 +178,9 @@ ISO_INLINE Ray make_given_ray(GivenRay given) {
   r.x = make_ray_axis(given.o_x, given.d_x);
   r.y = make_ray_axis(given.o_y, given.d_y);
   r.z = make_ray_axis(given.o_z, given.d_z);
+  r.begin_t = 0.0f;
+  r.end_t = INFINITY;
+  r.cut_by = ISO_NOT_CUT;
   return r;
 }
 

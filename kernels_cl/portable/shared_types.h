@@ -101,6 +101,16 @@ inline uint popcount(uint x) {
 #endif
 #define ISO_BANDS (ISO_LEVELS && !ISO_GIVEN_RAYS) /* rays go from level to level */
 
+#ifndef ISO_CLIP /* by -D */
+#ifdef __OPENCL_C_VERSION__
+#define ISO_CLIP 0 /* 1: rays of the camera are clipped (clip.h) */
+#else
+#define ISO_CLIP 1
+#endif
+#endif
+#define ISO_INTERVALS (ISO_BANDS || ISO_CLIP) /* rays begin and end elsewhere than at 0, INFINITY \
+                                               */
+
 /// The voxels of a volume, or of one of its levels of detail, and the blocks that hold them.
 typedef struct BlockGrid {
   uint dims_x, dims_y, dims_z;        ///< voxels; dual cells are one fewer
@@ -152,6 +162,27 @@ typedef struct Band {
   float begin_t, end_t;
 } Band;
 ISO_CHECK_SIZE(Band, 8);
+
+#define ISO_MAX_CLIP_PLANES 14  ///< eight planes and a box
+
+/// A clipping plane. Distances from it are positive on the side that stays [world units /
+/// ClipParams::t_scale].
+typedef struct PlaneParams {
+  float eye;             ///< distance of the eye; of parallel rays, of the middle of their plane
+  float fwd, right, up;  ///< its growth along the axes of the camera, of length 1
+  float grad_x, grad_y, grad_z;  ///< its growth for each voxel of the finest level
+  float first_voxel;             ///< distance of voxel (0,0,0)
+} PlaneParams;
+ISO_CHECK_SIZE(PlaneParams, 32);
+
+/// The part of a volume that is drawn (clip.h): what is in front of all planes.
+typedef struct ClipParams {
+  PlaneParams planes[ISO_MAX_CLIP_PLANES];
+  uint num_planes;
+  uint with_caps;  ///< 1: what is inside the surface hits where it is cut
+  float t_scale;   ///< View::t_scale of the finest level
+} ClipParams;
+ISO_CHECK_SIZE(ClipParams, 460);
 
 /// The isosurface, and the box of its blocks.
 typedef struct Surface {
@@ -215,14 +246,17 @@ typedef struct BlockRays {
 } BlockRays;
 ISO_CHECK_SIZE(BlockRays, 8);
 
+#define ISO_CAP 64u  ///< added to HitRecord::cell of a hit on a clipping plane
+
 /// One pixel's hit (design: a hit is cell + local position; t is derived from it).
 typedef struct HitRecord {
   float t;        ///< distance from the eye [world units]; INFINITY: no hit
   uint block_id;  ///< bx + blocks_x * (by + blocks_y * bz); of several levels, see LevelPlace
-  uint cell;      ///< x + 4 y + 16 z in the block
+  uint cell;      ///< x + 4 y + 16 z in the block; of a cap, ISO_CAP more
   float x, y, z;  ///< position in the dual cell, [0,1]^3
   float grad_x, grad_y,
-      grad_z;  ///< gradient there, see smooth_gradient.h [value per voxel], index space
+      grad_z;  ///< gradient there, see smooth_gradient.h [value per voxel], index space; of a cap,
+               ///< along the plane's normal
 } HitRecord;
 ISO_CHECK_SIZE(HitRecord, 36);
 

@@ -175,6 +175,11 @@ isowave::FrameRequest request_of(const nb::dict &options) {
       get(name, cameras);
       for (const nb::dict &camera : cameras)
         for_each_camera_field(field.emplace_back(), reader_of(camera));
+    } else if constexpr (std::is_same_v<Field, std::vector<isowave::ClipPlane>>) {
+      std::vector<nb::dict> planes;
+      get(name, planes);
+      for (const nb::dict &plane : planes)
+        for_each_plane_field(field.emplace_back(), reader_of(plane));
     } else if constexpr (!std::is_enum_v<Field>) {
       get(name, field);
     }

@@ -62,6 +62,17 @@ class Progress {
   virtual Array<std::uint8_t> picture() const = 0;
 };
 
+/// A clipping plane: the half space of the points p with dot(normal, p) >= offset stays.
+struct ClipPlane {
+  Vector3 normal{1, 0, 0};  ///< world space, of any length above 0, towards what stays
+  double offset = 0;        ///< [world units times the normal's length]
+};
+
+/// The planes of a box that stays, with edges along the world's axes.
+///
+/// Throws  Error: the box has no inside
+std::array<ClipPlane, 6> box_planes(const Vector3 &begin, const Vector3 &end);
+
 /// One frame: what to draw, how precisely, and which arrays to return. Rendering the same request
 /// again gives the same bits, unless there is a time budget.
 struct FrameRequest {
@@ -71,6 +82,10 @@ struct FrameRequest {
   double isovalue = 0;
   ImageSize size{};
   Appearance appearance{};
+  std::vector<ClipPlane> clip{};  ///< up to 14; what is in all half spaces is drawn
+  /// Draws flat caps where planes cut what is inside the surface, which are shaded as the surface.
+  /// Otherwise cuts are open, and show the surface from within.
+  bool caps = true;
 
   /// Largest distance between voxels of a coarser level of detail [pixels]; 0: the finest level
   /// draws all. Needs RendererOptions::with_levels.
@@ -130,6 +145,13 @@ void for_each_camera_field(AnyCamera &camera, const Visit &visit) {
   visit("parallel_height", camera.parallel_height);
 }
 
+/// Calls visit(name, field) for each field of a clipping plane.
+template <class AnyPlane, class Visit>
+void for_each_plane_field(AnyPlane &plane, const Visit &visit) {
+  visit("normal", plane.normal);
+  visit("offset", plane.offset);
+}
+
 /// Calls visit(name, field) for each field of a request, its camera and its appearance, except
 /// on_pass. The names are those of isowave's Python package.
 ///
@@ -147,6 +169,8 @@ void for_each_field(Request &request, const Visit &visit) {
   visit("diffuse", request.appearance.diffuse);
   visit("specular", request.appearance.specular);
   visit("above", request.appearance.above);
+  visit("clip", request.clip);
+  visit("caps", request.caps);
   visit("voxel_pixels", request.voxel_pixels);
   visit("voxel_error", request.voxel_error);
   visit("bound", request.bound);

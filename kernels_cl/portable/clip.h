@@ -1,0 +1,82 @@
+/// clip.h -- clipping planes: the part of each ray of the camera that is drawn
+/// (core/view/clip.hpp). Portable: OpenCL C 1.2 and C++.
+///
+/// A ray's distance from a plane is a linear function of t, as its coordinate on an axis is
+/// (RayAxis), and the ray crosses the plane where that is 0. So the interval of a ray is a pure
+/// function of ray and planes. It has the same bits in all bricks, and in all levels of detail,
+/// whose t differ by powers of two.
+#ifndef ISOWAVE_CLIP_H
+#define ISOWAVE_CLIP_H
+
+#include "grid_dda.h"
+
+ISO_NAMESPACE_BEGIN
+
+/// The rays's distance from a plane as an axis. See make_ray().
+ISO_INLINE RayAxis make_plane_axis(const View *view, const ClipParams *clip,
+                                   const PlaneParams *plane, float u, float v, float length) {
+  return make_camera_axis(view->is_parallel, u, v, length,
+                          plane->eye * (clip->t_scale / view->t_scale), plane->fwd, plane->right,
+                          plane->up);
+}
+
+/// Shortens the interval of a ray of the camera to what is in front of all planes. An empty one
+/// ends where it begins, or before.
+ISO_INLINE void clip_ray(const FrameParams *frame, const ClipParams *clip, uint pixel, Ray *ray) {
+  const RayOfView r = ray_of_view(&frame->view, pixel);
+  float begin = 0.0f, end = INFINITY;
+  int cut_by = ISO_NOT_CUT;
+  for (uint i = 0; i < clip->num_planes; ++i) {
+    const RayAxis a = make_plane_axis(&frame->view, clip, &clip->planes[i], r.u, r.v, r.length);
+    const float t = a.d == 0.0f ? (a.o < 0.0f ? 0.0f : INFINITY) : plane_t(a, 0.0f).hi;
+    if (a.d > 0.0f && t > begin) {
+      begin = t;
+      cut_by = (int)i;
+    }
+    if (!(a.d > 0.0f) && t < end) end = t;
+  }
+  if (cut_by != ISO_NOT_CUT && begin >= ray->begin_t) {
+    ray->begin_t = begin;
+    ray->cut_by = cut_by;
+  }
+  if (end < ray->end_t) ray->end_t = end;
+}
+
+/// Is there any of the ray left?
+ISO_INLINE int has_interval(const Ray *ray) {
+  return ray->begin_t < ray->end_t;
+}
+
+/// Does a ray that begins inside the surface hit there?
+ISO_INLINE int begins_at_cap(const ClipParams *clip, const Ray *ray) {
+  return ISO_CLIP && ray->cut_by != ISO_NOT_CUT && clip->with_caps != 0;
+}
+
+/// Makes a hit where a clipped ray begins one of a cap.
+ISO_INLINE void cap_hit(const ClipParams *clip, const Ray *ray, HitRecord *hit) {
+  const PlaneParams *plane = &clip->planes[ray->cut_by];
+  hit->cell |= ISO_CAP;
+  hit->grad_x = plane->grad_x;
+  hit->grad_y = plane->grad_y;
+  hit->grad_z = plane->grad_z;
+}
+
+/// t at which a ray within all half spaces leaves them; INFINITY: never.
+///
+/// given  in the index space of a level of detail
+/// voxel  its voxels' size [voxels of the finest level]
+ISO_INLINE float clip_end(const ClipParams *clip, GivenRay given, float voxel) {
+  float end = INFINITY;
+  for (uint i = 0; i < clip->num_planes; ++i) {
+    const PlaneParams *p = &clip->planes[i];
+    const float d = fma(p->grad_x, given.d_x, fma(p->grad_y, given.d_y, p->grad_z * given.d_z)),
+                o = fma(p->grad_x, given.o_x, fma(p->grad_y, given.o_y, p->grad_z * given.o_z));
+    const float t = -fma(voxel, o, p->first_voxel) / (voxel * d);
+    if (d < 0.0f && t < end) end = t;
+  }
+  return end;
+}
+
+ISO_NAMESPACE_END
+
+#endif
