@@ -11,6 +11,7 @@
 #include "core/frame/ambient_rays.hpp"
 #include "core/view/detail.hpp"
 #include "kernels_cl/portable/cell_intersect.h"
+#include "kernels_cl/portable/clip.h"
 #include "kernels_cl/portable/smooth_gradient.h"
 
 namespace isowave::core {
@@ -85,16 +86,18 @@ HitRecord trace(const FrameParams &frame, const float *voxels, Solver solver, co
   return trace_box(frame, voxels, solver, ray, enter, {glm::ivec3(0), {last.x, last.y, last.z}});
 }
 
-/// The first hit of a ray in the band of one level. inside: in, is the ray where the band begins,
-/// if it comes from another; out, where the band ends, if the ray gets there within the domain, in
-/// a cell that has all its data.
+/// The first hit of a ray in its interval, in one level. inside: in, is the ray where the interval
+/// begins, if it comes from another level; out, where the interval ends, if the ray gets there
+/// within the domain, in a cell that has all its data.
 HitRecord trace_band(const FrameParams &frame, const float *voxels, Solver solver, const Ray &ray,
-                     std::optional<bool> &inside) {
+                     const ClipParams &clip, std::optional<bool> &inside) {
   const LastPlanes last = last_planes(&frame), zero{};
-  const RayEvent end = border_event(frame.band.end_t);
-  RayEvent enter = border_event(frame.band.begin_t), exit = end;
+  const RayEvent end = border_event(ray.end_t);
+  RayEvent enter = border_event(ray.begin_t), exit = end;
   HitRecord hit = no_hit();
-  const std::optional<bool> before = std::exchange(inside, std::nullopt);
+  std::optional<bool> before = std::exchange(inside, std::nullopt);
+  const bool has_cap = begins_at_cap(&clip, &ray);
+  if (has_cap) before = false;
   if (!clip_to_box(&ray, zero, last, &enter, &exit)) return hit;
   bool at_border = enter.axis == ISO_AXIS_START && before.has_value();
   const CellBox domain{glm::ivec3(0), {last.x, last.y, last.z}};
@@ -111,6 +114,7 @@ HitRecord trace_band(const FrameParams &frame, const float *voxels, Solver solve
                if (at_border && !lacks_data(w) && inside_now(cell_enter, false) != before) {
                  hit =
                      make_hit(&frame, &ray, w, cell.x, cell.y, cell.z, cell_enter, cell_exit, 0.0f);
+                 if (has_cap) cap_hit(&clip, &ray, &hit);
                  return true;
                }
                at_border = false;
@@ -137,6 +141,7 @@ HitRecord among_levels(const FrameParams &frame, HitRecord hit) {
 
 /// hit: its block is number block_id of the frame's own level.
 void smooth_gradient(const FrameParams &frame, const float *voxels, uint block_id, HitRecord &hit) {
+  if (is_cap(hit)) return;
   const BlockCoords block = block_coords(&frame, block_id);
   const Stencil s = stencil_of(block, hit.cell, last_planes(&frame));
   const CellPoint at = {hit.x, hit.y, hit.z};
@@ -207,6 +212,12 @@ void append_segments(const FrameParams &frame, std::span<const float> voxels, co
       });
 }
 
+Ray in_band(const FrameParams &frame, Ray ray) {
+  ray.begin_t = frame.band.begin_t;
+  ray.end_t = frame.band.end_t;
+  return ray;
+}
+
 HitRecord trace_scalar(const FrameParams &frame, std::span<const float> voxels, Solver solver,
                        const Ray &ray) {
   check_voxels(frame, voxels);
@@ -244,12 +255,12 @@ std::vector<HitRecord> render_scalar(const FrameParams &frame, std::span<const f
 
 HitRecord trace_scalar_levels(std::span<const FrameParams> frames,
                               std::span<const std::vector<float>> voxels, Solver solver,
-                              std::span<const Ray> rays) {
+                              std::span<const Ray> rays, const ClipParams &clip) {
   HitRecord hit = no_hit();
   std::optional<bool> inside;
   for (std::size_t level = 0; level < frames.size() && !std::isfinite(hit.t); ++level) {
     if (!draws(frames[level])) continue;
-    hit = trace_band(frames[level], voxels[level].data(), solver, rays[level], inside);
+    hit = trace_band(frames[level], voxels[level].data(), solver, rays[level], clip, inside);
     if (std::isfinite(hit.t)) hit = among_levels(frames[level], hit);
   }
   return hit;
@@ -278,7 +289,7 @@ std::vector<uchar> count_open(std::span<const FrameParams> frames,
                               std::span<const VolumeInfo> levels,
                               std::span<const std::vector<float>> voxels,
                               std::span<const HitRecord> hits, std::uint32_t num_rays,
-                              Solver solver, unsigned threads) {
+                              Solver solver, unsigned threads, const ClipParams &clip) {
   const std::size_t first =
       static_cast<std::size_t>(std::ranges::find_if(frames, draws) - frames.begin());
   const FrameParams &seen = frames[first];
@@ -301,7 +312,10 @@ std::vector<uchar> count_open(std::span<const FrameParams> frames,
                         directions[k * ISO_AMBIENT_PATTERNS + ambient_pattern(&seen, pixel)]);
         const HitRecord met =
             trace(frames[level], voxels[level].data(), solver, make_given_ray(given));
-        counts[pixel] = static_cast<uchar>(counts[pixel] + !std::isfinite(met.t));
+        const bool is_open = !std::isfinite(met.t) ||
+                             is_clipped(&clip, given, std::ldexp(1.0f, static_cast<int>(level)),
+                                        met.t / frames[level].view.t_scale);
+        counts[pixel] = static_cast<uchar>(counts[pixel] + is_open);
       }
     }
   });
@@ -318,13 +332,17 @@ void smooth_gradients(const FrameParams &frame, std::span<const float> voxels,
 
 std::vector<HitRecord> render_scalar_levels(std::span<const FrameParams> frames,
                                             std::span<const std::vector<float>> voxels,
-                                            Solver solver, unsigned threads) {
+                                            Solver solver, unsigned threads,
+                                            const ClipParams &clip) {
   for (std::size_t level = 0; level < frames.size(); ++level)
     check_voxels(frames[level], voxels[level]);
   return trace_pixels(frames[0], threads, [&](std::uint32_t pixel) {
     std::vector<Ray> rays;
-    for (const FrameParams &frame : frames) rays.push_back(make_ray(&frame, pixel));
-    return trace_scalar_levels(frames, voxels, solver, rays);
+    for (const FrameParams &frame : frames) {
+      rays.push_back(in_band(frame, make_ray(&frame, pixel)));
+      clip_ray(&frame, &clip, pixel, &rays.back());
+    }
+    return trace_scalar_levels(frames, voxels, solver, rays, clip);
   });
 }
 

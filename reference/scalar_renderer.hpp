@@ -25,9 +25,12 @@ std::vector<HitRecord> render_scalar(const FrameParams &frame, std::span<const f
 /// The same for a frame that several levels of detail draw, each its band: frames as
 /// make_level_frames() returns them, and the voxels of each level. The side that a ray is on is
 /// carried from cell to cell across borders.
+///
+/// clip  the part of the volume that is drawn: all of it by default
 std::vector<HitRecord> render_scalar_levels(std::span<const FrameParams> frames,
                                             std::span<const std::vector<float>> voxels,
-                                            Solver solver = kDefaultSolver, unsigned threads = 0);
+                                            Solver solver = kDefaultSolver, unsigned threads = 0,
+                                            const ClipParams &clip = {});
 
 /// Gives the hits of such frames smooth gradients (Normals::kSmooth), and changes nothing else.
 void smooth_gradients(std::span<const FrameParams> frames,
@@ -38,17 +41,23 @@ void smooth_gradients(const FrameParams &frame, std::span<const float> voxels,
                       std::span<HitRecord> hits);
 
 /// How many of num_rays ambient rays of each hit meet nothing (kernels_cl/portable/ambient.h); 0
-/// where there is no hit. The arguments are those of render_scalar_levels(), and the levels' infos.
+/// where there is no hit. What a ray meets behind a clipping plane does not count. The arguments
+/// are those of render_scalar_levels(), and the levels' infos.
 std::vector<uchar> count_open(std::span<const FrameParams> frames,
                               std::span<const VolumeInfo> levels,
                               std::span<const std::vector<float>> voxels,
                               std::span<const HitRecord> hits, std::uint32_t num_rays,
-                              Solver solver = kDefaultSolver, unsigned threads = 0);
+                              Solver solver = kDefaultSolver, unsigned threads = 0,
+                              const ClipParams &clip = {});
 
-/// One ray of the same: rays [level], which is the same ray in each level's index space.
+/// One ray of the same: rays [level], which is the same ray in each level's index space, with its
+/// interval there.
 HitRecord trace_scalar_levels(std::span<const FrameParams> frames,
                               std::span<const std::vector<float>> voxels, Solver solver,
-                              std::span<const Ray> rays);
+                              std::span<const Ray> rays, const ClipParams &clip = {});
+
+/// The ray, with the frame's band as its interval.
+Ray in_band(const FrameParams &frame, Ray ray);
 
 /// One ray of render_scalar(): the hit of `ray` (index space; t in units of frame.view.t_scale).
 /// frame: dims, blocks, isovalue and t_scale are used.

@@ -42,21 +42,24 @@ Twin::Twin(const CompressedVolume &volume, double voxel_pixels, double voxel_err
 }
 
 std::vector<HitRecord> Twin::render(const Camera &camera, ImageSize size, float isovalue,
-                                    Solver solver, Normals normals) const {
+                                    Solver solver, Normals normals, const Clip &clip) const {
   const std::vector<FrameParams> frames =
       make_level_frames(levels_, camera, size, isovalue, voxel_pixels_);
-  std::vector<HitRecord> hits = render_scalar_levels(frames, voxels_, solver);
+  std::vector<HitRecord> hits = render_scalar_levels(
+      frames, voxels_, solver, 0, make_clip_params(levels_[0], frames[0].view, camera, clip));
   if (normals == Normals::kSmooth) smooth_gradients(frames, voxels_, hits);
   return hits;
 }
 
 OpenCounts Twin::open(const Camera &camera, ImageSize size, float isovalue,
-                      const std::vector<HitRecord> &hits, std::uint32_t num_rays,
-                      Solver solver) const {
+                      const std::vector<HitRecord> &hits, std::uint32_t num_rays, Solver solver,
+                      const Clip &clip) const {
   check_ambient_rays(num_rays);
   const std::vector<FrameParams> frames =
       make_level_frames(levels_, camera, size, isovalue, voxel_pixels_);
-  return {count_open(frames, levels_, voxels_, hits, num_rays, solver), num_rays};
+  return {count_open(frames, levels_, voxels_, hits, num_rays, solver, 0,
+                     make_clip_params(levels_[0], frames[0].view, camera, clip)),
+          num_rays};
 }
 
 }  // namespace isowave::core

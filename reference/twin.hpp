@@ -7,6 +7,7 @@
 #include "core/frame/appearance.hpp"
 #include "core/frame/normals.hpp"
 #include "core/frame/solvers.hpp"
+#include "core/view/clip.hpp"
 #include "core/view/detail.hpp"
 #include "core/zfp/level_bounds.hpp"
 #include "core/zfp/zfp_stream.hpp"
@@ -24,13 +25,13 @@ class Twin {
 
   /// The hits [height * width] that a renderer must find, bit for bit.
   std::vector<HitRecord> render(const Camera &camera, ImageSize size, float isovalue,
-                                Solver solver = kDefaultSolver,
-                                Normals normals = Normals::kSmooth) const;
+                                Solver solver = kDefaultSolver, Normals normals = Normals::kSmooth,
+                                const Clip &clip = {}) const;
 
   /// How open such hits are, of a renderer's frame with ambient rays.
   OpenCounts open(const Camera &camera, ImageSize size, float isovalue,
                   const std::vector<HitRecord> &hits, std::uint32_t num_rays,
-                  Solver solver = kDefaultSolver) const;
+                  Solver solver = kDefaultSolver, const Clip &clip = {}) const;
 
  private:
   double voxel_pixels_;

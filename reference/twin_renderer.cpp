@@ -18,6 +18,7 @@ Abilities TwinRenderer::abilities() const {
   abilities.fewer_planes = true;
   abilities.bounds = true;
   abilities.given_rays = true;
+  abilities.clipping = true;
   abilities.solver = solver_;
   return abilities;
 }
@@ -36,11 +37,12 @@ FrameStats TwinRenderer::render(const FrameRequest &request) {
   }
   const auto begin = std::chrono::steady_clock::now();
   frame_ = make_frame_params(volume_.info, request.camera, size_, request.isovalue);
-  hits_ = twin_->render(request.camera, size_, request.isovalue, solver_, request.normals);
+  hits_ = twin_->render(request.camera, size_, request.isovalue, solver_, request.normals,
+                        request.clip);
   open_ = {};
   if (request.ambient_rays != 0)
-    open_ =
-        twin_->open(request.camera, size_, request.isovalue, hits_, request.ambient_rays, solver_);
+    open_ = twin_->open(request.camera, size_, request.isovalue, hits_, request.ambient_rays,
+                        solver_, request.clip);
   FrameStats stats;
   stats.rays_hit = static_cast<std::uint64_t>(
       std::ranges::count_if(hits_, [](const HitRecord &hit) { return std::isfinite(hit.t); }));

@@ -48,12 +48,14 @@ Shot random_shot(const GridLevels &levels, Random &random) {
       return make_ray_axis(std::ldexp(o, -static_cast<int>(level)),
                            std::ldexp(static_cast<float>(direction[i]), -static_cast<int>(level)));
     };
-    shot.rays.push_back({axis(0), axis(1), axis(2)});
+    shot.rays.push_back(make_whole_ray(axis(0), axis(1), axis(2)));
     shot.frames[level].band.begin_t = begin;
     if (level + 1 == levels.frames.size()) continue;
     begin += static_cast<float>(random.in_box({0, 0, 0}, {distance == 0 ? 20.0 : 60.0, 1, 1})[0]);
     shot.frames[level].band.end_t = begin;
   }
+  for (std::size_t level = 0; level < shot.rays.size(); ++level)
+    shot.rays[level] = in_band(shot.frames[level], shot.rays[level]);
   return shot;
 }
 

@@ -528,7 +528,8 @@ TEST(Bricks, RaysPassThroughEachCellInOneBrick) {
       d[axis] = random() % 5 == 0 ? 0.0f : (kind == 1 ? std::floor(real(-2, 3)) : real(-1, 1));
     }
     if (d == glm::vec3(0)) continue;
-    const Ray ray = {make_ray_axis(o.x, d.x), make_ray_axis(o.y, d.y), make_ray_axis(o.z, d.z)};
+    const Ray ray =
+        make_whole_ray(make_ray_axis(o.x, d.x), make_ray_axis(o.y, d.y), make_ray_axis(o.z, d.z));
     std::vector<glm::ivec3> expected, got;
     walk(ray, make_grid_params(info), glm::ivec3(0), blocks_along(info), expected);
     const std::vector<std::uint32_t> places = cuts.order_from(o);

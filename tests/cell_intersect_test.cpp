@@ -81,8 +81,8 @@ TEST(CellIntersect, SharedFacesHaveEqualBits) {
     std::array<float, 3> o;
     for (int k = 0; k < 3; ++k)
       o[k] = static_cast<float>(from[k]) + 0.5f + unit(random) * 0.7f - distance * d[k];
-    const Ray ray = {make_ray_axis(o[0], d[0]), make_ray_axis(o[1], d[1]),
-                     make_ray_axis(o[2], d[2])};
+    const Ray ray = make_whole_ray(make_ray_axis(o[0], d[0]), make_ray_axis(o[1], d[1]),
+                                   make_ray_axis(o[2], d[2]));
     const RayAxis axes[3] = {ray.x, ray.y, ray.z};
     const int plane = step > 0 ? to[axis] : from[axis];
     const RayEvent face = make_event(plane_t(axes[axis], static_cast<float>(plane)), axis);
@@ -338,8 +338,8 @@ TEST(CellIntersect, CellsFarFromTheEye) {
       cell[axis] = static_cast<int>(random() % 2000);
       o[axis] = static_cast<float>(cell[axis]) + 0.5f + 0.5f * unit(random) - distance * d[axis];
     }
-    const Ray ray = {make_ray_axis(o[0], d[0]), make_ray_axis(o[1], d[1]),
-                     make_ray_axis(o[2], d[2])};
+    const Ray ray = make_whole_ray(make_ray_axis(o[0], d[0]), make_ray_axis(o[1], d[1]),
+                                   make_ray_axis(o[2], d[2]));
     const LastPlanes last = {4000, 4000, 4000};
     const GridWalk region = walk_from(&ray, cell[0], cell[1], cell[2], 1, last);
     const RayEvent enter = region_entry(&ray, cell[0], cell[1], cell[2], 1, last),

@@ -146,7 +146,8 @@ inline PredicateFuzz check_near_ties(std::uint64_t num_rays, std::uint32_t seed)
     const TwoFloat t = plane_t(a, x);
     const float d = random.whole(0, 1) != 0 ? random.real(0.5f, 1) : random.real(-1, -0.5f);
     const double o = y - (double{t.hi} + double{t.lo}) * d * (1 + random.real(-1, 1) * 0x1p-22);
-    const Ray ray = {a, make_ray_axis(static_cast<float>(o), d), make_ray_axis(0.5f, 0)};
+    const Ray ray =
+        make_whole_ray(a, make_ray_axis(static_cast<float>(o), d), make_ray_axis(0.5f, 0));
     GridWalk w{};
     w.far_x = x;
     w.far_y = y;

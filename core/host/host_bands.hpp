@@ -37,32 +37,35 @@ inline uint side_at_border(const HostLevel &level, const Ray &ray, LastPlanes la
              : ISO_SIDE_OUTSIDE;
 }
 
-/// The hit of a ray at the border at which its band begins, in that cell. Few rays have one.
+/// The hit of a ray where its interval begins, in that cell. Few rays have one.
 __attribute__((noinline)) inline HitRecord hit_at_border(const HostLevel &level, const Ray &ray,
                                                          LastPlanes last, BlockCoords cell) {
-  const FrameParams &frame = level.frame;
   const int x = static_cast<int>(cell.x), y = static_cast<int>(cell.y),
             z = static_cast<int>(cell.z);
   const GridWalk walk = walk_from(&ray, x, y, z, 1, last);
   const RayEvent exit = walk_exit(&walk, &ray);
   float w[8];
   open_cell(level, cell, w);
-  return make_hit(&frame, &ray, w, x, y, z, border_event(frame.band.begin_t),
-                  passes_border(exit, frame.band.end_t) ? border_event(frame.band.end_t) : exit,
-                  0.0f);
+  HitRecord hit = make_hit(&level.frame, &ray, w, x, y, z, border_event(ray.begin_t),
+                           passes_border(exit, ray.end_t) ? border_event(ray.end_t) : exit, 0.0f);
+  if (begins_at_cap(level.clip, &ray)) cap_hit(level.clip, &ray, &hit);
+  return hit;
 }
 
 /// The first hit of a ray, from band to band. If two levels have it on different sides of the
-/// surface, it hits at their border.
+/// surface, it hits at their border; if it is inside where it is cut, it hits there.
 template <auto kTraceRay, auto kSide>
 inline bool trace_bands(std::span<const HostLevel> levels, uint ray_id, HitRecord *hit) {
   uint before = ISO_SIDE_UNKNOWN;
   for (const HostLevel &level : levels) {
     const LastPlanes last = last_planes(&level.frame);
-    const Ray ray = make_ray(&level.frame, ray_id);
+    const Ray ray = ray_of_level(level, ray_id);
+    if (!has_interval(&ray)) continue;
+    if (ray.cut_by != ISO_NOT_CUT)
+      before = begins_at_cap(level.clip, &ray) ? ISO_SIDE_OUTSIDE : ISO_SIDE_UNKNOWN;
     BlockCoords cell;
     if (before != ISO_SIDE_UNKNOWN) {
-      const uint side = kSide(level, ray, last, level.frame.band.begin_t, &cell);
+      const uint side = kSide(level, ray, last, ray.begin_t, &cell);
       if (side != ISO_SIDE_UNKNOWN && side != before) {
         *hit = hit_at_border(level, ray, last, cell);
         return true;
@@ -70,7 +73,8 @@ inline bool trace_bands(std::span<const HostLevel> levels, uint ray_id, HitRecor
     }
     const ActiveBox box = active_box(level.frame.surface, last);
     if (kTraceRay(level.frame, level.field, box, last, ray, hit)) return true;
-    if (&level != &levels.back()) before = kSide(level, ray, last, level.frame.band.end_t, &cell);
+    if (ray.end_t < level.frame.band.end_t) return false;
+    if (&level != &levels.back()) before = kSide(level, ray, last, ray.end_t, &cell);
   }
   return false;
 }
@@ -105,7 +109,7 @@ inline uint trace_rays_of_levels(std::span<const HostLevel> levels, const RayTil
 struct RayPacket {
   uint x, y;
   uint lanes;       ///< bit column + 4 row: the rays that have no hit yet
-  uchar before[8];  ///< where they were at the end of the last band
+  uchar before[8];  ///< where they were at the end of the last band; of the first, unknown
   BandSides sides;  ///< of this band
 
   uint ray_id(const FrameParams &frame, uint lane) const {
@@ -113,20 +117,21 @@ struct RayPacket {
   }
 };
 
-/// Lets rays hit at the border at which a level's band begins, if the level before has them on the
-/// other side of the surface. Returns these rays.
+/// Lets rays hit where they begin in a level, if the level before has them on the other side of the
+/// surface, or if they are inside and a cap is there. Returns these rays.
 template <auto kSide>
 inline uint hit_at_borders(const HostLevel &level, const RayPacket &packet, HitRecord *hits) {
   const LastPlanes last = last_planes(&level.frame);
   uint found = 0;
   for (uint left = packet.lanes; left != 0; left &= left - 1) {
     const auto lane = static_cast<uint>(std::countr_zero(left));
-    const uint before = packet.before[lane], at_begin = packet.sides.at_begin[lane];
+    const uint before = packet.sides.before(packet.before, lane),
+               at_begin = packet.sides.at_begin[lane];
     if (before == ISO_SIDE_UNKNOWN || at_begin == ISO_SIDE_UNKNOWN || at_begin == before) continue;
     const uint ray_id = packet.ray_id(level.frame, lane);
-    const Ray ray = make_ray(&level.frame, ray_id);
+    const Ray ray = ray_of_level(level, ray_id);
     BlockCoords cell;
-    const uint side = kSide(level, ray, last, level.frame.band.begin_t, &cell);
+    const uint side = kSide(level, ray, last, ray.begin_t, &cell);
     if (side == ISO_SIDE_UNKNOWN || side == before) continue;
     hits[ray_id] = hit_at_border(level, ray, last, cell);
     found |= 1u << lane;
@@ -141,10 +146,10 @@ inline void end_band(const HostLevel &level, RayPacket &packet) {
     const auto lane = static_cast<uint>(std::countr_zero(left));
     packet.before[lane] = packet.sides.at_end[lane];
     if (packet.before[lane] != ISO_SIDE_NOT_CERTAIN) continue;
-    const Ray ray = make_ray(&level.frame, packet.ray_id(level.frame, lane));
+    const Ray ray = ray_of_level(level, packet.ray_id(level.frame, lane));
     BlockCoords cell;
-    packet.before[lane] = static_cast<uchar>(
-        kSide(level, ray, last_planes(&level.frame), level.frame.band.end_t, &cell));
+    packet.before[lane] =
+        static_cast<uchar>(kSide(level, ray, last_planes(&level.frame), ray.end_t, &cell));
   }
 }
 
@@ -158,9 +163,10 @@ inline uint trace_levels(std::span<const HostLevel> levels, const RayTile &tile,
       RayPacket packet = {x, y, y + 1 < tile.end_y ? columns | columns << 4 : columns, {}, {}};
       for (const HostLevel &level : levels) {
         uint found = kTraceBand(level, x, y, packet.lanes, hits, &packet.sides);
-        if (&level != levels.data()) found |= hit_at_borders<kSide>(level, packet, hits);
+        if (&level != levels.data() || level.clip != nullptr)
+          found |= hit_at_borders<kSide>(level, packet, hits);
         num_hits += static_cast<uint>(std::popcount(found));
-        packet.lanes &= ~found;
+        packet.lanes &= ~(found | packet.sides.ended);
         if (packet.lanes == 0) break;
         if (&level != &levels.back()) end_band<kSide>(level, packet);
       }

@@ -123,8 +123,9 @@ inline void cast(const FrameParams &frame, const HostField &field, const IndexRa
 }
 
 template <auto kTraceRay>
-inline void ambient(const FrameParams &frame, const HostField &field, const RayTile &tile,
-                    const AmbientRays &rays, const HitRecord *hits, uchar *open_counts) {
+inline void ambient(const HostLevel &level, const RayTile &tile, const AmbientRays &rays,
+                    const HitRecord *hits, uchar *open_counts) {
+  const FrameParams &frame = level.frame;
   const LastPlanes last = last_planes(&frame);
   const ActiveBox box = active_box(frame.surface, last);
   HitRecord met;
@@ -138,7 +139,9 @@ inline void ambient(const FrameParams &frame, const HostField &field, const RayT
       for (uint k = 0; k < rays.num_rays; ++k) {
         const GivenRay given = ambient_ray(rays.seen, &rays.params, placed, ray_id,
                                            rays.directions[k * ISO_AMBIENT_PATTERNS + pattern]);
-        num_open += !kTraceRay(frame, field, box, last, make_given_ray(given), &met);
+        const bool meets = kTraceRay(frame, level.field, box, last, make_given_ray(given), &met);
+        num_open += !meets || (level.clip != nullptr && is_clipped(level.clip, given, rays.voxel,
+                                                                   met.t / frame.view.t_scale));
       }
       open_counts[ray_id] = static_cast<uchar>(num_open);
     }
@@ -182,10 +185,10 @@ ISO_WHOLE_LOOP void cast_anywhere(const FrameParams &frame, const HostField &fie
                                   HitRecord *hits) {
   cast<trace_ray_anywhere>(frame, field, rays, num_rays, is_smooth, hits);
 }
-ISO_WHOLE_LOOP void ambient_anywhere(const FrameParams &frame, const HostField &field,
-                                     const RayTile &tile, const AmbientRays &rays,
-                                     const HitRecord *hits, uchar *open_counts) {
-  ambient<trace_ray_anywhere>(frame, field, tile, rays, hits, open_counts);
+ISO_WHOLE_LOOP void ambient_anywhere(const HostLevel &level, const RayTile &tile,
+                                     const AmbientRays &rays, const HitRecord *hits,
+                                     uchar *open_counts) {
+  ambient<trace_ray_anywhere>(level, tile, rays, hits, open_counts);
 }
 ISO_WHOLE_LOOP void shade_anywhere(const FrameParams &frame, const ShadeParams &params,
                                    uint samples, uint row, const HitRecord *hits,
@@ -244,10 +247,10 @@ ISO_WIDE_LOOP void cast_wide(const FrameParams &frame, const HostField &field, c
                              uint num_rays, bool is_smooth, HitRecord *hits) {
   cast<trace_ray_wide>(frame, field, rays, num_rays, is_smooth, hits);
 }
-ISO_WIDE_LOOP void ambient_wide(const FrameParams &frame, const HostField &field,
-                                const RayTile &tile, const AmbientRays &rays, const HitRecord *hits,
+ISO_WIDE_LOOP void ambient_wide(const HostLevel &level, const RayTile &tile,
+                                const AmbientRays &rays, const HitRecord *hits,
                                 uchar *open_counts) {
-  ambient<trace_ray_wide>(frame, field, tile, rays, hits, open_counts);
+  ambient<trace_ray_wide>(level, tile, rays, hits, open_counts);
 }
 ISO_WIDE_LOOP void shade_wide(const FrameParams &frame, const ShadeParams &params, uint samples,
                               uint row, const HitRecord *hits, const uchar *open_counts,

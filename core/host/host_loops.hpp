@@ -11,6 +11,7 @@
 
 #include "core/view/given_rays.hpp"
 #include "kernels_cl/portable/ambient.h"
+#include "kernels_cl/portable/clip.h"
 #include "kernels_cl/portable/ray_state.h"
 #include "kernels_cl/portable/shade.h"
 
@@ -78,7 +79,17 @@ struct HostField {
 struct HostLevel {
   FrameParams frame;  ///< its surface's box is that of the field's active blocks
   HostField field;
+  const ClipParams *clip = nullptr;  ///< null: the whole volume is drawn
 };
+
+/// A ray of the camera in a level of detail, with its interval there.
+inline Ray ray_of_level(const HostLevel &level, uint ray_id) {
+  Ray ray = make_ray(&level.frame, ray_id);
+  ray.begin_t = level.frame.band.begin_t;
+  ray.end_t = level.frame.band.end_t;
+  if (level.clip != nullptr) clip_ray(&level.frame, level.clip, ray_id, &ray);
+  return ray;
+}
 
 /// The side on which a whole block is; unknown if it may have cells that change.
 inline uint side_of_block(const FrameParams &frame, const HostField &field, BlockCoords b) {
@@ -103,6 +114,7 @@ struct AmbientRays {
   uint num_rays;                       ///< of each hit
   const FrameParams *seen;             ///< the frame of the finest level that draws
   uint level;                          ///< of the hits, counted from that one
+  float voxel;                         ///< of the level [voxels of the finest level]
 };
 
 struct HostLoops {
@@ -125,8 +137,8 @@ struct HostLoops {
   /// The same, ray by ray; trace() is compared with it.
   uint (*trace_rays)(const FrameParams &frame, const HostField &field, const RayTile &tile,
                      bool is_smooth, HitRecord *hits);
-  /// The same as trace() for a frame that several levels of detail draw, the finest first, each its
-  /// band.
+  /// The same as trace() for a frame that is clipped, or that several levels of detail draw, the
+  /// finest first, each its band.
   uint (*trace_levels)(std::span<const HostLevel> levels, const RayTile &tile, bool is_smooth,
                        HitRecord *hits);
   /// The same, ray by ray.
@@ -138,11 +150,9 @@ struct HostLoops {
   void (*cast)(const FrameParams &frame, const HostField &field, const IndexRay *rays,
                uint num_rays, bool is_smooth, HitRecord *hits);
   /// Counts the ambient rays of a tile's hits in a level of detail that meet nothing in that level,
-  /// into open_counts [height * width].
-  ///
-  /// frame      the level's, as for trace(), with a band without ends
-  void (*ambient)(const FrameParams &frame, const HostField &field, const RayTile &tile,
-                  const AmbientRays &rays, const HitRecord *hits, uchar *open_counts);
+  /// or what is clipped, into open_counts [height * width].
+  void (*ambient)(const HostLevel &level, const RayTile &tile, const AmbientRays &rays,
+                  const HitRecord *hits, uchar *open_counts);
   /// Shades a row of the picture of the frame's hits [height * width].
   ///
   /// samples      rays per pixel along each axis

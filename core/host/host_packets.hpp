@@ -15,18 +15,26 @@ namespace isowave::core {
 uint trace_packets(const FrameParams &frame, const HostField &field, const RayTile &tile,
                    HitRecord *hits);
 
-/// The sides of the surface on which eight rays are at the borders of a level's band: find_sides()
-/// of kernels_cl/portable/packet_sides.h.
+/// The sides of the surface on which eight rays are where they begin and end in a level:
+/// find_sides() of kernels_cl/portable/packet_sides.h. Bits count lanes.
 struct BandSides {
   uchar at_begin[8], at_end[8];
+  uint cut = 0, capped = 0;  ///< rays that begin at a clipping plane; those of a cap
+  uint ended = 0;            ///< rays that end at one: no further band has any of them
+
+  /// Where a ray was before it begins in the level.
+  uint before(const uchar *at_end_of_last, uint lane) const {
+    if ((cut >> lane & 1) == 0) return at_end_of_last[lane];
+    return (capped >> lane & 1) != 0 ? ISO_SIDE_OUTSIDE : ISO_SIDE_UNKNOWN;
+  }
 };
 
-/// Traces eight rays, 4 columns and 2 rows from (x, y) on, in the band of a level of detail, and
-/// writes the hits of cells into hits [height * width].
+/// Traces eight rays, 4 columns and 2 rows from (x, y) on, in their intervals in a level of detail,
+/// and writes the hits of cells into hits [height * width].
 ///
 /// lanes    bit column + 4 row: the rays to trace
-/// Out      sides: at the beginning of the band, if it is behind the rays' start, of all these
-///          rays; at its end, if there is one, of those that do not hit
+/// Out      sides: where the rays begin, if that is behind their start; where the band ends, if it
+///          does, of those that do not hit
 /// Returns  those that hit something
 uint trace_band_packet(const HostLevel &level, uint x, uint y, uint lanes, HitRecord *hits,
                        BandSides *sides);

@@ -8,6 +8,7 @@
 #include "core/host/host_loops.hpp"
 #include "kernels_cl/portable/block_cells.h"
 #include "kernels_cl/portable/cell_intersect.h"
+#include "kernels_cl/portable/clip.h"
 #include "kernels_cl/portable/level_border.h"
 #include "kernels_cl/portable/smooth_gradient.h"
 
@@ -49,9 +50,10 @@ inline bool is_hit_of(const FrameParams &frame, const HitRecord &hit) {
   return hit.t != INFINITY && level_block_of(&frame, hit.block_id) != ISO_INVALID_ID;
 }
 
-/// Gives a hit the smooth gradient, if there is one.
+/// Gives a hit the smooth gradient, if there is one. Caps keep theirs.
 inline void smooth_gradient(const FrameParams &frame, const HostField &field, LastPlanes last,
                             HitRecord *hit) {
+  if (is_cap(*hit)) return;
   const Stencil s = stencil_of(block_coords(&frame, hit->block_id), hit->cell, last);
   decode_stencil(frame, field, s);
   const StencilAxis axes[3] = {s.x, s.y, s.z};
@@ -72,7 +74,7 @@ inline void smooth_gradient(const FrameParams &frame, const HostField &field, La
   hit->grad_z = derivatives[2];
 }
 
-/// The first hit of a ray in a block's changing cells, before its band ends. enter: by which it
+/// The first hit of a ray in a block's changing cells, within its interval. enter: by which it
 /// enters the block.
 inline bool trace_block(const FrameParams &frame, const HostField &field, const Ray &ray,
                         const GridWalk &block, RayEvent enter, LastPlanes last, HitRecord *hit) {
@@ -83,7 +85,7 @@ inline bool trace_block(const FrameParams &frame, const HostField &field, const 
   const ulong changing = field.changing[block_number];
   CellWalk at = enter_cells(&ray, b, enter, last);
   do {
-    if (passes_border(at.exit, frame.band.end_t)) at.exit = border_event(frame.band.end_t);
+    if (passes_border(at.exit, ray.end_t)) at.exit = border_event(ray.end_t);
     if ((changing >> cell_in_block(&at.cell) & 1u) == 0) continue;
     const int x = at.cell.x, y = at.cell.y, z = at.cell.z;
     float w[8];
@@ -129,13 +131,13 @@ inline ActiveBox active_box(const Surface &surface, LastPlanes last) {
            (surface.active_end_z - 1) / kBlocks}};
 }
 
-/// The first hit of a ray in the band of a level. Walks from macrocell to macrocell, in those with
-/// an active block from block to block, and in active blocks from cell to cell.
+/// The first hit of a ray in its interval in a level. Walks from macrocell to macrocell, in those
+/// with an active block from block to block, and in active blocks from cell to cell.
 inline bool walk_ray(const FrameParams &frame, const HostField &field, const ActiveBox &box,
                      LastPlanes last, const Ray &ray, HitRecord *hit) {
   constexpr int kVoxels = 4 * ISO_MACROCELL_BLOCKS;
   const uint columns = (frame.grid.blocks_x + 3) / 4, rows = (frame.grid.blocks_y + 3) / 4;
-  RayEvent enter = border_event(frame.band.begin_t), exit = border_event(frame.band.end_t);
+  RayEvent enter = border_event(ray.begin_t), exit = border_event(ray.end_t);
   if (!clip_to_box(&ray, box.begin, box.end, &enter, &exit)) return false;
   GridWalk coarse =
       walk_from(&ray, locate(ray.x, 0, enter, kVoxels, box.first.x, box.final.x),
@@ -149,7 +151,7 @@ inline bool walk_ray(const FrameParams &frame, const HostField &field, const Act
                                static_cast<ulong>(rows) * static_cast<ulong>(coarse.z))];
     if (mask == 0) {
       exit = walk_exit(&coarse, &ray);
-      if (passes_border(exit, frame.band.end_t)) return false;
+      if (passes_border(exit, ray.end_t)) return false;
     } else {
       GridWalk block = enter_macrocell(ray, coarse, enter, last);
       for (bool left = false; !left; enter = exit) {
@@ -157,7 +159,7 @@ inline bool walk_ray(const FrameParams &frame, const HostField &field, const Act
             trace_block(frame, field, ray, block, enter, last, hit))
           return true;
         exit = walk_exit(&block, &ray);
-        if (passes_border(exit, frame.band.end_t)) return false;
+        if (passes_border(exit, ray.end_t)) return false;
         left = leaves(&block, &coarse, exit) != 0;
         walk_step(&block, &ray, exit, 4, last);
       }

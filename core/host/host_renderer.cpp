@@ -75,7 +75,8 @@ bool HostRenderer::fits(const CompressedVolume &volume, std::uint64_t memory_lim
 Abilities HostRenderer::abilities_of(const CompressedVolume &volume) {
   Abilities abilities;
   abilities.levels = !volume.coarser_levels.empty();
-  abilities.fewer_planes = abilities.bounds = abilities.given_rays = abilities.kept_picture = true;
+  abilities.clipping = abilities.fewer_planes = abilities.bounds = abilities.given_rays =
+      abilities.kept_picture = true;
   return abilities;
 }
 
@@ -85,7 +86,12 @@ FrameStats HostRenderer::render(const FrameRequest &request) {
   const ImageSize size = size_of(request, abilities());
   const std::vector<FrameParams> frames = make_level_frames(levels_.infos(), request.camera, size,
                                                             request.isovalue, request.voxel_pixels);
-  const std::vector<HostLevel> drawing = levels_.open(frames, request.voxel_error, request.bound);
+  std::vector<HostLevel> drawing = levels_.open(frames, request.voxel_error, request.bound);
+  const ClipParams clip =
+      make_clip_params(info_, frames.front().view, request.camera, request.clip);
+  if (clip.num_planes != 0) {
+    for (HostLevel &level : drawing) level.clip = &clip;
+  }
   frame_ = frames.front();
   size_ = size;
   open_ = {};
@@ -130,7 +136,7 @@ void HostRenderer::draw_bands(const FrameRequest &request, std::span<const HostL
         const HostLoops &loops = host_loops();
         if (is_alone) {
           num_hits += loops.trace_rays_of_levels(drawing, part, is_smooth, hits_.data());
-        } else if (drawing.size() == 1) {
+        } else if (drawing.size() == 1 && first.clip == nullptr) {
           num_hits += loops.trace(first.frame, first.field, part, is_smooth, hits_.data());
         } else {
           num_hits += loops.trace_levels(drawing, part, is_smooth, hits_.data());
@@ -155,17 +161,17 @@ void HostRenderer::add_ambient(const FrameRequest &request, std::span<const Host
   const std::vector<AmbientDirection> directions = make_ambient_directions(request.ambient_rays);
   const AmbientParams params = make_ambient_params(levels_.infos()[stats.first_level]);
   const FrameParams &seen = drawing.front().frame;
-  std::vector<HostLevel> whole(drawing.begin(), drawing.end());
-  for (HostLevel &level : whole) level.frame.band = {.begin_t = 0, .end_t = INFINITY};
   open_.counts.assign(hits_.size(), static_cast<uchar>(request.ambient_rays));
   open_.num_ambient = request.ambient_rays;
   stats.cancelled = !for_bands(
       request.on_pass, false,
       [&](const RayTile &tile, bool) {
-        for (uint level = 0; level < whole.size(); ++level) {
-          const AmbientRays rays{params, directions.data(), request.ambient_rays, &seen, level};
-          host_loops().ambient(whole[level].frame, whole[level].field, within(tile, seen.screen),
-                               rays, hits_.data(), open_.counts.data());
+        for (uint level = 0; level < drawing.size(); ++level) {
+          const float voxel = std::ldexp(1.0f, static_cast<int>(stats.first_level + level));
+          const AmbientRays rays{params, directions.data(), request.ambient_rays, &seen, level,
+                                 voxel};
+          host_loops().ambient(drawing[level], within(tile, seen.screen), rays, hits_.data(),
+                               open_.counts.data());
         }
       },
       [&](std::uint32_t) {

@@ -96,6 +96,7 @@ inline void sides_in_cells(const PacketField *field, const FrameParams *frame, c
 
 }  // namespace isowave::core::ISO_PACKET_NAMESPACE
 
+#include "kernels_cl/portable/packet_clip.h"
 #include "kernels_cl/portable/packet_sides.h"
 #include "kernels_cl/portable/packet_walk.h"
 
@@ -114,12 +115,11 @@ inline Mask lanes_of(uint bits) {
 
 inline void make_packet_rays(const FrameParams &frame, Ints column, Ints row, PacketRays *rays) {
   make_packet_axes(&frame, column, row, rays->axis);
-  rays->begin_t = frame.band.begin_t;
-  rays->end_t = frame.band.end_t;
+  set_packet_interval(rays, frame.band);
 }
 
-/// Traces a packet's rays (column, row) of the frame in the given lanes, in the band of the frame's
-/// level. Returns the lanes that hit something. A function of its own, since it is long.
+/// Traces a packet's rays (column, row) of the frame in the given lanes, in their intervals.
+/// Returns the lanes that hit something. A function of its own, since it is long.
 __attribute__((flatten, noinline)) inline Mask trace_packet(const PacketScene &scene, Ints column,
                                                             Ints row, Mask lanes, HitRecord *hits,
                                                             Packet *p) {
@@ -154,8 +154,9 @@ __attribute__((flatten)) inline uint trace_tile(const FrameParams &frame, const 
   return num_hits;
 }
 
-inline void keep_sides(Ints of_lanes, uchar *sides) {
-  for (int lane = 0; lane < 8; ++lane) sides[lane] = static_cast<uchar>(of_lanes[lane]);
+inline void keep_sides(Ints of_lanes, Mask lanes, uchar *sides) {
+  const Ints known = pick(lanes, of_lanes, ints(ISO_SIDE_UNKNOWN));
+  for (int lane = 0; lane < 8; ++lane) sides[lane] = static_cast<uchar>(known[lane]);
 }
 
 /// As trace_band_packet().
@@ -166,14 +167,25 @@ __attribute__((flatten)) inline uint trace_band(const HostLevel &level, uint x, 
   const Mask of = lanes_of(lanes);
   Packet p;
   make_packet_rays(frame, column, row, &p.rays);
+  *sides = {};
+  Mask drawn = of;
+  if (level.clip != nullptr) {
+    clip_packet(&frame, level.clip, column, row, &p.rays);
+    drawn &= have_intervals(&p.rays);
+    sides->cut = bits_of(of & (p.rays.cut_by != ISO_NOT_CUT));
+    if (level.clip->with_caps != 0) sides->capped = sides->cut;
+    sides->ended = bits_of(of & (p.rays.end_t < frame.band.end_t));
+  }
   PacketScene scene;
   const bool is_active = make_packet_scene(&frame, &level.field, &scene) != 0;
-  if (frame.band.begin_t > 0)
-    keep_sides(find_sides(&scene, &p.rays, frame.band.begin_t, of), sides->at_begin);
-  const Mask found = is_active ? trace_packet(scene, column, row, of, hits, &p) : ints(0);
-  const Mask left = of & ~found;
-  if (packet_band_ends(&p.rays) && any(left))
-    keep_sides(find_sides(&scene, &p.rays, frame.band.end_t, left), sides->at_end);
+  const Mask begins_late = drawn & (p.rays.begin_t > 0.0f);
+  if (any(begins_late))
+    keep_sides(find_sides(&scene, &p.rays, p.rays.begin_t, begins_late), begins_late,
+               sides->at_begin);
+  const Mask found = is_active ? trace_packet(scene, column, row, drawn, hits, &p) : ints(0);
+  const Mask left = drawn & ~found & (p.rays.end_t == frame.band.end_t);
+  if (frame.band.end_t < ISO_NEVER && any(left))
+    keep_sides(find_sides(&scene, &p.rays, p.rays.end_t, left), left, sides->at_end);
   return bits_of(found);
 }
 

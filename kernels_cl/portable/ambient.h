@@ -107,7 +107,7 @@ ISO_INLINE HitRecord placed_hit(const FrameParams *of_level, uint level, HitReco
   const BlockCoords b = block_coords(of_level, hit.block_id);
   hit.x = (float)(4 * b.x + (hit.cell & 3u)) + of_level->brick.origin_x + hit.x;
   hit.y = (float)(4 * b.y + (hit.cell >> 2 & 3u)) + of_level->brick.origin_y + hit.y;
-  hit.z = (float)(4 * b.z + (hit.cell >> 4)) + of_level->brick.origin_z + hit.z;
+  hit.z = (float)(4 * b.z + (hit.cell >> 4 & 3u)) + of_level->brick.origin_z + hit.z;
   hit.cell = level;
   return hit;
 }

@@ -61,20 +61,23 @@ ISO_INLINE void cap_hit(const ClipParams *clip, const Ray *ray, HitRecord *hit) 
   hit->grad_z = plane->grad_z;
 }
 
-/// t at which a ray within all half spaces leaves them; INFINITY: never.
+ISO_INLINE int is_cap(HitRecord hit) {
+  return ISO_CLIP && hit.t != INFINITY && (hit.cell & ISO_CAP) != 0;
+}
+
+/// Has a ray that begins in front of all planes left their half spaces at t?
 ///
 /// given  in the index space of a level of detail
 /// voxel  its voxels' size [voxels of the finest level]
-ISO_INLINE float clip_end(const ClipParams *clip, GivenRay given, float voxel) {
-  float end = INFINITY;
+ISO_INLINE int is_clipped(const ClipParams *clip, GivenRay given, float voxel, float t) {
+  int behind = 0;
   for (uint i = 0; i < clip->num_planes; ++i) {
     const PlaneParams *p = &clip->planes[i];
     const float d = fma(p->grad_x, given.d_x, fma(p->grad_y, given.d_y, p->grad_z * given.d_z)),
                 o = fma(p->grad_x, given.o_x, fma(p->grad_y, given.o_y, p->grad_z * given.o_z));
-    const float t = -fma(voxel, o, p->first_voxel) / (voxel * d);
-    if (d < 0.0f && t < end) end = t;
+    behind |= d < 0.0f && fma(voxel, fma(t, d, o), p->first_voxel) < 0.0f;
   }
-  return end;
+  return behind;
 }
 
 ISO_NAMESPACE_END

@@ -172,16 +172,22 @@ ISO_INLINE Ray make_ray(const FrameParams *frame, uint pixel) {
   return r;
 }
 
-/// A ray of a list, of a whole volume.
-ISO_INLINE Ray make_given_ray(GivenRay given) {
+/// A ray with all of its interval.
+ISO_INLINE Ray make_whole_ray(RayAxis x, RayAxis y, RayAxis z) {
   Ray r;
-  r.x = make_ray_axis(given.o_x, given.d_x);
-  r.y = make_ray_axis(given.o_y, given.d_y);
-  r.z = make_ray_axis(given.o_z, given.d_z);
+  r.x = x;
+  r.y = y;
+  r.z = z;
   r.begin_t = 0.0f;
   r.end_t = INFINITY;
   r.cut_by = ISO_NOT_CUT;
   return r;
+}
+
+/// A ray of a list, of a whole volume.
+ISO_INLINE Ray make_given_ray(GivenRay given) {
+  return make_whole_ray(make_ray_axis(given.o_x, given.d_x), make_ray_axis(given.o_y, given.d_y),
+                        make_ray_axis(given.o_z, given.d_z));
 }
 
 /// "There is no ray."

@@ -21,10 +21,10 @@ typedef struct PacketAxis {
   Floats sign;  ///< 1 or -1, by up
 } PacketAxis;
 
-/// Instead of an axis, the end of the rays' band, which is on no plane.
+/// Instead of an axis, the end of a ray's interval, which is on no plane.
 #define ISO_AXIS_END 4
 
-/// The plane that each ray crosses; axis ISO_AXIS_START: the ray starts there, or enters its band.
+/// The plane that each ray crosses; axis ISO_AXIS_START: the ray begins there.
 typedef struct Crossings {
   Ints axis;
   Floats plane;
@@ -41,18 +41,28 @@ typedef struct Cubics {
 /// The places of rays, for the scalar functions.
 typedef struct PacketRays {
   PacketAxis axis[3];
-  Crossings entered;     ///< by which rays entered the regions where they are
-  float begin_t, end_t;  ///< the level's band, if ISO_BANDS is 1
+  Crossings entered;  ///< by which rays entered the regions where they are
+  /* Their intervals, as of Ray, if ISO_INTERVALS is 1. */
+  Floats begin_t, end_t;
+  Ints cut_by;
+  int has_end;  ///< do intervals end?
 } PacketRays;
 
-/// The moment at which rays start, or enter their band.
-ISO_INLINE float packet_begin_t(const PacketRays *r) {
-  return ISO_BANDS ? r->begin_t : 0.0f;
+/// The moments at which rays begin.
+ISO_INLINE Floats packet_begin_t(const PacketRays *r) {
+  return ISO_INTERVALS ? r->begin_t : floats(0.0f);
 }
 
-/// Does the rays' band end?
-ISO_INLINE int packet_band_ends(const PacketRays *r) {
-  return ISO_BANDS && r->end_t < ISO_NEVER;
+ISO_INLINE int packet_has_end(const PacketRays *r) {
+  return ISO_INTERVALS && r->has_end != 0;
+}
+
+/// Gives all rays an interval.
+ISO_INLINE void set_packet_interval(PacketRays *r, Band band) {
+  r->begin_t = floats(band.begin_t);
+  r->end_t = floats(band.end_t);
+  r->cut_by = ints(ISO_NOT_CUT);
+  r->has_end = band.end_t < ISO_NEVER;
 }
 
 // ---- Crossings and cells
@@ -164,10 +174,14 @@ ISO_INLINE void make_packet_camera_axis(const View *view, Floats u, Floats v, Fl
   }
 }
 
-/// make_ray() of pixels (column, row), into axes [3].
-ISO_INLINE void make_packet_axes(const FrameParams *frame, Ints column, Ints row,
-                                 PacketAxis *axes) {
-  const View *view = &frame->view;
+/// As RayOfView.
+typedef struct PacketOfView {
+  Floats u, v, length;
+} PacketOfView;
+
+/// ray_of_view() of pixels (column, row).
+ISO_INLINE PacketOfView packet_of_view(const View *view, Ints column, Ints row) {
+  PacketOfView r;
   if (view->stride > 1) {
     ISO_EACH_LANE(lane, ints(-1)) {
       const RayPlace place = place_of_ray(view, column[lane], row[lane]);
@@ -175,16 +189,23 @@ ISO_INLINE void make_packet_axes(const FrameParams *frame, Ints column, Ints row
       row[lane] = place.row;
     }
   }
-  const Floats u =
-      to_floats(2 * column + 1 - (int)(view->stride * view->width)) * view->pixel_scale;
-  const Floats v = to_floats((int)(view->stride * view->height) - 1 - 2 * row) * view->pixel_scale;
-  const Floats length = sqrt(fma(u, u, fma(v, v, floats(1.0f))));
-  make_packet_camera_axis(view, u, v, length, view->eye_x, view->fwd_x, view->right_x, view->up_x,
-                          frame->brick.origin_x, &axes[0]);
-  make_packet_camera_axis(view, u, v, length, view->eye_y, view->fwd_y, view->right_y, view->up_y,
-                          frame->brick.origin_y, &axes[1]);
-  make_packet_camera_axis(view, u, v, length, view->eye_z, view->fwd_z, view->right_z, view->up_z,
-                          frame->brick.origin_z, &axes[2]);
+  r.u = to_floats(2 * column + 1 - (int)(view->stride * view->width)) * view->pixel_scale;
+  r.v = to_floats((int)(view->stride * view->height) - 1 - 2 * row) * view->pixel_scale;
+  r.length = sqrt(fma(r.u, r.u, fma(r.v, r.v, floats(1.0f))));
+  return r;
+}
+
+/// make_ray() of pixels (column, row), into axes [3].
+ISO_INLINE void make_packet_axes(const FrameParams *frame, Ints column, Ints row,
+                                 PacketAxis *axes) {
+  const View *view = &frame->view;
+  const PacketOfView r = packet_of_view(view, column, row);
+  make_packet_camera_axis(view, r.u, r.v, r.length, view->eye_x, view->fwd_x, view->right_x,
+                          view->up_x, frame->brick.origin_x, &axes[0]);
+  make_packet_camera_axis(view, r.u, r.v, r.length, view->eye_y, view->fwd_y, view->right_y,
+                          view->up_y, frame->brick.origin_y, &axes[1]);
+  make_packet_camera_axis(view, r.u, r.v, r.length, view->eye_z, view->fwd_z, view->right_z,
+                          view->up_z, frame->brick.origin_z, &axes[2]);
 }
 
 /// Planes of the brick as those of the whole volume, and positions the other way round.
@@ -209,11 +230,14 @@ ISO_INLINE Ray ray_of_lane(const PacketRays *rays, int lane) {
   ray.x = axis_of_lane(&rays->axis[0], lane);
   ray.y = axis_of_lane(&rays->axis[1], lane);
   ray.z = axis_of_lane(&rays->axis[2], lane);
+  ray.begin_t = packet_begin_t(rays)[lane];
+  ray.end_t = ISO_INTERVALS ? rays->end_t[lane] : INFINITY;
+  ray.cut_by = ISO_INTERVALS ? rays->cut_by[lane] : ISO_NOT_CUT;
   return ray;
 }
 ISO_INLINE RayEvent event_of_lane(const PacketRays *rays, int lane) {
   const int axis = rays->entered.axis[lane];
-  if (axis == ISO_AXIS_START) return border_event(packet_begin_t(rays));
+  if (axis == ISO_AXIS_START) return border_event(packet_begin_t(rays)[lane]);
   return make_event(plane_t(axis_of_lane(&rays->axis[axis], lane), rays->entered.plane[lane]),
                     axis);
 }
@@ -231,7 +255,7 @@ ISO_INLINE Floats of_axis(Ints axis, Floats x, Floats y, Floats z) {
 ISO_INLINE Floats crossing_float_t(const PacketRays *r, Crossings c) {
   const Floats from = of_axis(c.axis, r->axis[0].from, r->axis[1].from, r->axis[2].from),
                rate = of_axis(c.axis, r->axis[0].rate, r->axis[1].rate, r->axis[2].rate);
-  return pick(c.axis == ISO_AXIS_START, floats(packet_begin_t(r)), (c.plane - from) * rate);
+  return pick(c.axis == ISO_AXIS_START, packet_begin_t(r), (c.plane - from) * rate);
 }
 
 /// The moments at which rays entered their regions, in float32.
@@ -245,10 +269,10 @@ ISO_INLINE TwoFloats crossing_t(const PacketRays *r, Crossings c) {
       of_axis(c.axis, r->axis[0].o, r->axis[1].o, r->axis[2].o),
       of_axis(c.axis, r->axis[0].inv_hi, r->axis[1].inv_hi, r->axis[2].inv_hi),
       of_axis(c.axis, r->axis[0].inv_lo, r->axis[1].inv_lo, r->axis[2].inv_lo), c.plane);
-  t.hi = pick(c.axis == ISO_AXIS_START, floats(packet_begin_t(r)), t.hi);
+  t.hi = pick(c.axis == ISO_AXIS_START, packet_begin_t(r), t.hi);
   t.lo = pick(c.axis == ISO_AXIS_START, floats(0.0f), t.lo);
-  if (packet_band_ends(r)) {
-    t.hi = pick(c.axis == ISO_AXIS_END, floats(r->end_t), t.hi);
+  if (packet_has_end(r)) {
+    t.hi = pick(c.axis == ISO_AXIS_END, r->end_t, t.hi);
     t.lo = pick(c.axis == ISO_AXIS_END, floats(0.0f), t.lo);
   }
   return t;
@@ -335,7 +359,7 @@ typedef struct Entry {
 /// near [3]: by which rays enter a region.
 ISO_INLINE Entry last_entry(const PacketRays *r, const Floats *near) {
   Entry entry;
-  entry.t = floats(packet_begin_t(r));
+  entry.t = packet_begin_t(r);
   entry.before = floats(-ISO_NEVER);
   entry.at.axis = ints(ISO_AXIS_START);
   entry.at.plane = floats(0.0f);

@@ -169,8 +169,7 @@ ISO_RARE Entered settle_box_entries(const PacketRays *r, const PacketScene *scen
   end.z = scene->end[2];
   ISO_EACH_LANE(lane, lanes) {
     const Ray ray = ray_of_lane(r, lane);
-    RayEvent enter = border_event(packet_begin_t(r)),
-             exit = border_event(packet_band_ends(r) ? r->end_t : INFINITY);
+    RayEvent enter = border_event(ray.begin_t), exit = border_event(ray.end_t);
     settled.lanes[lane] = clip_to_box(&ray, begin, end, &enter, &exit) != 0 ? -1 : 0;
     settled.at.axis[lane] = enter.axis;
     if (enter.axis != ISO_AXIS_START) {
@@ -182,10 +181,11 @@ ISO_RARE Entered settle_box_entries(const PacketRays *r, const PacketScene *scen
   return settled;
 }
 
-/// r->entered = the crossings by which rays enter the box of active blocks, or start in it, or
-/// enter their band there. Returns the lanes that do.
+/// r->entered = the crossings by which rays enter the box of active blocks, or begin in it. Returns
+/// the lanes that do.
 ISO_INLINE Mask enter_box(PacketRays *r, const PacketScene *scene) {
-  Floats near[3], exit = floats(packet_band_ends(r) ? r->end_t : ISO_NEVER);
+  Floats near[3], exit = floats(ISO_NEVER);
+  if (packet_has_end(r)) exit = smaller(exit, r->end_t);
   Mask beside = ints(0);
   ISO_EACH_OF_3(axis) {
     const PacketAxis *a = &r->axis[axis];

@@ -39,12 +39,12 @@ typedef struct CellsAtBorder {
 } CellsAtBorder;
 
 ISO_INLINE CellsAtBorder cells_at_border(const PacketScene *scene, const PacketRays *rays,
-                                         float t) {
+                                         Floats t) {
   CellsAtBorder cells;
   cells.within = cells.block_certain = cells.is_certain = ints(-1);
   ISO_EACH_OF_3(axis) {
     const PacketAxis *a = &rays->axis[axis];
-    const Floats position = fma(floats(t), a->d, a->o), at = in_brick(a, position),
+    const Floats position = fma(t, a->d, a->o), at = in_brick(a, position),
                  error = ISO_FLOAT_DOUBT * (fabs(position) + fabs(a->o)),
                  last = floats((float)scene->last[axis]);
     cells.within &= (at > 0.0f) & (at < last);
@@ -61,7 +61,7 @@ ISO_INLINE CellsAtBorder cells_at_border(const PacketScene *scene, const PacketR
 /// The sides of the surface on which rays are at t, of the given lanes, by the blocks and cells
 /// that are on one side as a whole; unknown if they are not in the domain then.
 /// ISO_SIDE_NOT_CERTAIN: a cell's values decide, or float32 is not enough.
-ISO_INLINE Ints find_sides(const PacketScene *scene, const PacketRays *rays, float t, Mask lanes) {
+ISO_INLINE Ints find_sides(const PacketScene *scene, const PacketRays *rays, Floats t, Mask lanes) {
   const CellsAtBorder cells = cells_at_border(scene, rays, t);
   const Mask in_blocks = lanes & cells.within & cells.block_certain;
   Ints sides = pick(cells.block_certain & ~cells.within, ints((int)ISO_SIDE_UNKNOWN),

@@ -99,14 +99,14 @@ ISO_INLINE void leave_by(Packet *p, int level, Mask lanes, Exits exits) {
   if (level < ISO_MACROCELLS && any(left)) leave_regions(p, ISO_MACROCELLS, left, &by);
 }
 
-/// Lanes that have entered their regions behind the end of their band, by float32 without doubt.
-/// test_cells() finds the others.
-ISO_INLINE Mask behind_band(const PacketRays *r, Mask lanes) {
+/// Lanes that have entered their regions behind the end of their interval, by float32 without
+/// doubt. test_cells() finds the others.
+ISO_INLINE Mask behind_end(const PacketRays *r, Mask lanes) {
   return lanes & (entry_t(r) > r->end_t + 2.0f * ISO_FLOAT_DOUBT * r->end_t);
 }
 
-/// Takes all lanes that walk among the regions of a level to the next one, unless their band ends
-/// before.
+/// Takes all lanes that walk among the regions of a level to the next one, unless their interval
+/// ends before.
 ISO_INLINE void step_to_next(Packet *p, int level) {
   const Mask lanes = p->at[level];
   const Floats *far = p->level[level].far;
@@ -116,8 +116,8 @@ ISO_INLINE void step_to_next(Packet *p, int level) {
     p->rays.entered.plane = pick(exits.on[axis], far[axis], p->rays.entered.plane);
   }
   leave_by(p, level, lanes, exits);
-  if (level != ISO_CELLS && packet_band_ends(&p->rays)) {
-    const Mask behind = behind_band(&p->rays, lanes);
+  if (level != ISO_CELLS && packet_has_end(&p->rays)) {
+    const Mask behind = behind_end(&p->rays, lanes);
     ISO_EACH_OF_3(of) p->at[of] &= ~behind;
   }
 }
@@ -269,18 +269,19 @@ ISO_INLINE Mask load_cells(const Packet *p, const PacketScene *scene, const Floa
   return load_corners(scene->field, scene->frame, at, lanes, w);
 }
 
-/// Crossings that may be behind the end of the rays' band, by float32.
+/// Crossings that may be behind the end of the rays' intervals, by float32.
 ISO_INLINE Mask may_pass_end(const PacketRays *r, Crossings c) {
   return crossing_float_t(r, c) >= r->end_t - 2.0f * ISO_FLOAT_DOUBT * r->end_t;
 }
 
-/// passes_border() at the end of the rays' band.
+/// passes_border() at the end of the rays' intervals.
 ISO_INLINE Mask passes_end(const PacketRays *r, Crossings c) {
   const TwoFloats t = crossing_t(r, c);
   return (t.hi > r->end_t) | ((t.hi == r->end_t) & (t.lo > 0.0f));
 }
 
-/// Tests the cells where lanes stand, up to the end of their band. Those that find no hit walk on.
+/// Tests the cells where lanes stand, up to the end of their intervals. Those that find no hit walk
+/// on.
 ISO_INLINE void test_cells(Packet *p, const PacketScene *scene, Mask standing) {
   const Floats *far = p->level[ISO_CELLS].far;
   Floats cell[3];
@@ -293,7 +294,7 @@ ISO_INLINE void test_cells(Packet *p, const PacketScene *scene, Mask standing) {
   Crossings exit;
   exit.axis = pick(exits.on[0], ints(0), pick(exits.on[1], ints(1), ints(2)));
   exit.plane = pick(exits.on[0], far[0], pick(exits.on[1], far[1], far[2]));
-  if (packet_band_ends(&p->rays) && any(lanes & may_pass_end(&p->rays, exit))) {
+  if (packet_has_end(&p->rays) && any(lanes & may_pass_end(&p->rays, exit))) {
     lanes &= ~passes_end(&p->rays, p->rays.entered);
     ends = lanes & passes_end(&p->rays, exit);
     exit.axis = pick(ends, ints(ISO_AXIS_END), exit.axis);

@@ -59,7 +59,7 @@ ISO_INLINE HitCell hit_cell(const HitMap *m, uint block_id, uint cell) {
   while (at.level + 1 < m->num_levels && m->begin_z[at.level + 1] <= layer) ++at.level;
   at.x = 4 * (block_id % m->blocks_x) + (cell & 3u);
   at.y = 4 * (block_id / m->blocks_x % m->blocks_y) + (cell >> 2 & 3u);
-  at.z = 4 * (layer - m->begin_z[at.level]) + (cell >> 4);
+  at.z = 4 * (layer - m->begin_z[at.level]) + (cell >> 4 & 3u);
   return at;
 }
 
