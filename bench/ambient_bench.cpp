@@ -15,7 +15,7 @@ struct AmbientInput : RaysRig {
     rays.open_counts = {device, "open ambient rays", rays.num_rays};
     VolumeInfo info;
     info.dims = {params.grid.dims_x, params.grid.dims_y, params.grid.dims_z};
-    ambient.begin(info, 2);
+    ambient.begin(info, 0, 2);
     ambient(rays, 0);
     rays.given_hits.copy(rays.hits, rays.num_rays);  // all closed
     ambient(rays, 1);

@@ -5,24 +5,35 @@
 #define ISO_FOUND local
 #include "device/level_borders.h"
 #include "portable/ambient.h"
+#include "portable/clip.h"
 
 #ifndef ISO_PLACED_HITS   /* by -D */
 #define ISO_PLACED_HITS 0 /* 1: hits are placed_hit()s, of whatever brick */
 #endif
 
+/// Has a ray met what is clipped?
+ISO_INLINE int meets_clipped(const FrameParams *frame, const ClipParams *clip, uint first_level,
+                             GivenRay given, HitRecord met) {
+  const float in_first = (float)(1u << given.level), voxel = (float)(1u << first_level) * in_first;
+  return is_clipped(clip, given, voxel, met.t / (frame->view.t_scale * in_first));
+}
+
 /// frame_params, frames, num_frames  as start_rays
+/// clip        of the frame
+/// first_level the finest level of detail that draws, of all
 /// directions  [num_rounds][ISO_AMBIENT_PATTERNS]
 /// round       0..num_rounds: the rays to make; num_rounds: none
 /// In      hits [pixel]: of the frame; given [pixel], given_hits [pixel]: the rays of the round
 ///         before, and what they met
-/// Out     open_counts [pixel]: rays of the rounds before that met nothing, 0 without a hit;
-///         given [pixel]
+/// Out     open_counts [pixel]: rays of the rounds before that met nothing that is drawn, 0 without
+///         a hit; given [pixel]
 /// Launch  grid-stride over pixels
 kernel void ambient(const FrameParams frame_params, global const FrameParams *frames,
-                    uint num_frames, const AmbientParams params,
-                    global const AmbientDirection *directions, uint round, uint num_rounds,
-                    global const HitRecord *hits, global const HitRecord *given_hits,
-                    global GivenRay *given, global uchar *open_counts) {
+                    uint num_frames, const ClipParams clip, uint first_level,
+                    const AmbientParams params, global const AmbientDirection *directions,
+                    uint round, uint num_rounds, global const HitRecord *hits,
+                    global const HitRecord *given_hits, global GivenRay *given,
+                    global uchar *open_counts) {
   const FrameParams *frame = &frame_params;
   for (uint pixel = get_global_id(0); pixel < frame->view.width * frame->view.height;
        pixel += get_global_size(0)) {
@@ -32,8 +43,14 @@ kernel void ambient(const FrameParams frame_params, global const FrameParams *fr
       open_counts[pixel] = 0;
       continue;
     }
-    open_counts[pixel] =
-        (uchar)(round == 0 ? 0u : open_counts[pixel] + (given_hits[pixel].t == INFINITY));
+    uint num_open = 0;
+    if (round != 0) {
+      const int meets = given_hits[pixel].t != INFINITY &&
+                        (clip.num_planes == 0 || !meets_clipped(frame, &clip, first_level,
+                                                                given[pixel], given_hits[pixel]));
+      num_open = open_counts[pixel] + !meets;
+    }
+    open_counts[pixel] = (uchar)num_open;
     if (round == num_rounds) continue;
     HitRecord placed = hit;
     if (!ISO_PLACED_HITS) {

@@ -111,9 +111,9 @@ ISO_INLINE int leave(const RayMarch *m, uint behind, global uint *ray_block_ids,
 /// Walks rays on until they hit, leave or wait. A ray that leaves the band of its level waits
 /// behind the border.
 ///
-/// frame_params, frames, num_frames, parts, given, ranges, no_data, no_data_begin  as start_rays
-/// macrocell_masks                           as traverse
-/// In      active_ray_ids [prev->next_active_count]; ray_block_ids [pixel]: the active block that a
+/// frame_params, frames, num_frames, clip, parts, given, ranges, no_data, no_data_begin  as
+/// start_rays macrocell_masks                           as traverse In      active_ray_ids
+/// [prev->next_active_count]; ray_block_ids [pixel]: the active block that a
 ///         ray goes on from
 /// Out     hits [pixel]; next_active_ray_ids [counts->next_active_count] of the rays that wait, and
 ///         in ray_block_ids the block they wait at; *next_counts, opened; slot_stamps of the blocks
@@ -124,11 +124,12 @@ ISO_INLINE int leave(const RayMarch *m, uint behind, global uint *ray_block_ids,
 /// for the longest of them, each has more work-items, up to one for each block of a round; the
 /// first block in which anything happens decides, which an atomic_min of its place tells.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
-    const FrameParams frame_params, global const FrameParams *frames, uint num_frames, uint parts,
-    global const GivenRay *given, global const uint *macrocell_masks, global const ushort *ranges,
-    global const uint *no_data, uint no_data_begin, global BlockEntry *table,
-    global const ulong *inside, global const SlotValue *cache_values, global const PassCounts *prev,
-    global PassCounts *counts, global PassCounts *next_counts, global const uint *active_ray_ids,
+    const FrameParams frame_params, global const FrameParams *frames, uint num_frames,
+    const ClipParams clip, uint parts, global const GivenRay *given,
+    global const uint *macrocell_masks, global const ushort *ranges, global const uint *no_data,
+    uint no_data_begin, global BlockEntry *table, global const ulong *inside,
+    global const SlotValue *cache_values, global const PassCounts *prev, global PassCounts *counts,
+    global PassCounts *next_counts, global const uint *active_ray_ids,
     global uint *next_active_ray_ids, global uint *ray_block_ids, global HitRecord *hits,
     global uint *slot_stamps, global CacheState *cache) {
   const FrameParams *frame = &frame_params;
@@ -159,7 +160,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
     const uint pixel = m.entry.pixel;
     ISO_FRAME_OF(level, m.stand.block_id);
     const LastPlanes last = last_planes(level);
-    const Ray ray = ray_of(level, given, pixel);
+    const Ray ray = ray_of(level, &clip, given, pixel);
     m.blocks = blocks + item;
     m.decides = decides + item / lanes;
     for (int is_first = 1, more = 1; more != 0; is_first = 0) {
@@ -182,14 +183,14 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
       barrier(CLK_LOCAL_MEM_FENCE);
     }
     if (m.result == ISO_RAY_HIT) {
-      hits[pixel] = hit_of(level, &ray, &m.change);
+      hits[pixel] = hit_of(level, &clip, &ray, &m.change);
       ++num_hits;
       ++num_blocks;
     }
     uint behind = ISO_INVALID_ID, entry;
     if (leaves_band(m.result, m.is_gone && m.lane == 0)) {
-      behind = cross_borders(frames, num_frames, macrocell_masks, ranges, no_data, no_data_begin,
-                             pixel, level_of(frames, num_frames, m.stand.block_id),
+      behind = cross_borders(frames, num_frames, &clip, macrocell_masks, ranges, no_data,
+                             no_data_begin, pixel, level_of(frames, num_frames, m.stand.block_id),
                              leaves_on(m.result), m.blocks);
     }
     const int waits = leave(&m, behind, ray_block_ids, &entry);

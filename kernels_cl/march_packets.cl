@@ -9,8 +9,9 @@
 /// ISO_ON_DEMAND, by -D: 1: rays decode the blocks that they come to (on_demand.h). So they wait
 /// only if there is no free slot, and a frame with enough slots takes one pass.
 ///
-/// ISO_LEVELS, by -D, with ISO_ON_DEMAND: 1: the first pass of a frame that several levels of
-/// detail draw, in a launch for each band (packet_bands.h). Rays that wait then go on in march.
+/// ISO_LEVELS, by -D, with ISO_ON_DEMAND: 1: the first pass of a frame that is clipped or that
+/// several levels of detail draw, in a launch for each band (packet_bands.h). Rays that wait then
+/// go on in march.
 #ifndef ISO_ON_DEMAND
 #define ISO_ON_DEMAND 0
 #endif
@@ -338,30 +339,46 @@ ISO_INLINE uint count_chunks(const View *view, uint begins, uint num_rays) {
 }
 
 #if ISO_BANDS
+/// The intervals of a packet's rays in a level of detail, and where the rays were before. Returns
+/// the lanes that have one.
+ISO_INLINE Mask make_intervals(const FrameParams *frame, const ClipParams *clip,
+                               PacketSource source, PacketRays *r, Ints *before) {
+  make_packet_axes(frame, source.column, source.row, r->axis);
+  set_packet_interval(r, frame->band);
+  (void)clip;
+  (void)before;
+#if ISO_CLIP
+  clip_packet(frame, clip, source.column, source.row, r);
+  *before =
+      pick(r->cut_by != ISO_NOT_CUT,
+           ints(clip->with_caps != 0 ? (int)ISO_SIDE_OUTSIDE : (int)ISO_SIDE_UNKNOWN), *before);
+#endif
+  return have_intervals(r);
+}
+
 /// Walks the rays of a packet through the band of a level of detail. In the first band, they begin;
 /// in others, those go on that have left the one before.
-ISO_INLINE void draw_packet(Packet *p, const PacketScene *scene, int is_active_somewhere,
-                            PacketSource source, uint begins, LaunchRays *rays) {
+ISO_INLINE void draw_packet(Packet *p, const PacketScene *scene, const ClipParams *clip,
+                            int is_active_somewhere, PacketSource source, uint begins,
+                            LaunchRays *rays) {
   const FrameParams *frame = scene->frame;
   PacketProgress *progress = scene->field->progress;
   const Ints ray_ids = source.ray_ids;
   global uint *kept = &rays->band_packets[source.number];
   const int is_first = begins == ISO_BEGINS_FRAME;
-  const BandPacket before = unpack_band_packet(is_first ? 0 : *kept);
+  BandPacket before = unpack_band_packet(is_first ? 0 : *kept);
   Mask lanes = is_first ? on_screen(frame->screen, source) : before.lanes;
   if (!any(lanes)) {
     if (is_first) *kept = 0;
     return;
   }
-  make_packet_axes(frame, source.column, source.row, p->rays.axis);
-  p->rays.begin_t = frame->band.begin_t;
-  p->rays.end_t = frame->band.end_t;
-  const Mask comes = lanes & (before.sides != (int)ISO_SIDE_UNKNOWN);
+  const Mask drawn = make_intervals(frame, clip, source, &p->rays, &before.sides);
+  const Mask comes = lanes & drawn & (before.sides != (int)ISO_SIDE_UNKNOWN);
   if (any(comes)) {
     const Ints sides = sides_at(scene, &p->rays, p->rays.begin_t, comes);
     const Mask differs = comes & (sides != (int)ISO_SIDE_UNKNOWN) & (sides != before.sides);
     if (any(differs))
-      lanes &= ~differs | cross_border(scene, &p->rays, ray_ids, before.sides, differs, rays);
+      lanes &= ~differs | cross_border(scene, clip, &p->rays, ray_ids, before.sides, differs, rays);
   }
   if (is_active_somewhere && any(lanes)) {
     const Mask enters = enter_box(&p->rays, scene) & lanes;
@@ -381,14 +398,16 @@ ISO_INLINE void draw_packet(Packet *p, const PacketScene *scene, int is_active_s
   if (frame->band.end_t == INFINITY) return;
   BandPacket behind;
   behind.lanes = lanes & ~have_left(scene, &p->rays, p->rays.end_t, rays->bands_behind);
+  if (ISO_CLIP) behind.lanes &= p->rays.end_t == frame->band.end_t;
   behind.met = before.met | progress->met;
   behind.sides = ints(0);
-  if (any(behind.lanes)) {
-    behind.sides = sides_at(scene, &p->rays, p->rays.end_t, behind.lanes);
-    const Mask open = behind.lanes & (behind.sides == (int)ISO_SIDE_NOT_CERTAIN);
+  const Mask ends = ISO_CLIP ? behind.lanes & drawn : behind.lanes;
+  if (any(ends)) {
+    behind.sides = sides_at(scene, &p->rays, p->rays.end_t, ends);
+    const Mask open = ends & (behind.sides == (int)ISO_SIDE_NOT_CERTAIN);
     if (any(open)) {
       behind.sides = sides_of_each(scene, &p->rays, ray_ids, open, behind.sides, rays);
-      behind.lanes &= behind.sides != (int)ISO_SIDE_NOT_CERTAIN;
+      behind.lanes &= ~open | (behind.sides != (int)ISO_SIDE_NOT_CERTAIN);
     }
   }
   *kept = pack_band_packet(behind);
@@ -428,8 +447,10 @@ ISO_INLINE void march_packet(Packet *p, const PacketScene *scene, PacketSource s
 }
 
 /// Walks the rays of a packet on, and stores their hits, or where they wait.
-ISO_INLINE void draw_packet(Packet *p, const PacketScene *scene, int is_active_somewhere,
-                            PacketSource source, uint begins, LaunchRays *rays) {
+ISO_INLINE void draw_packet(Packet *p, const PacketScene *scene, const ClipParams *clip,
+                            int is_active_somewhere, PacketSource source, uint begins,
+                            LaunchRays *rays) {
+  (void)clip;
   const PacketProgress *progress = scene->field->progress;
   if (is_active_somewhere) march_packet(p, scene, source, begins, rays->ray_block_ids);
   if (any(p->found.lanes)) write_hits(p, scene, source.ray_ids, ISO_ROOT_STEPS, rays->hits);
@@ -456,6 +477,7 @@ ISO_INLINE void add_counts(const LaunchRays *rays, uint num_blocks, uint num_mad
 /// Walks rays on until they hit, leave or wait: those of the picture, in the first pass of a frame,
 /// or those that wait.
 ///
+/// clip             as start_rays
 /// begins           ISO_BEGINS_FRAME: the first pass of a frame; ISO_BEGINS_BAND: a further band
 /// bands_behind     bands of the frame behind this one
 /// part_0 .. layout the zfp stream (block_stream.h), as free_slots for decoding on demand alone
@@ -468,15 +490,15 @@ ISO_INLINE void add_counts(const LaunchRays *rays, uint num_blocks, uint num_mad
 ///         counts->free_count shrinks
 /// Launch  groups of one work-item, which stride over chunks of packets
 kernel __attribute__((reqd_work_group_size(1, 1, 1))) void march_packets(
-    const FrameParams frame_params, uint begins, uint bands_behind, global const uint *part_0,
-    global const uint *part_1, global const uint *part_2, global const uint *part_3,
-    global const uint *index, const StreamLayout layout, global const uint *macrocell_masks,
-    global const ushort *ranges, global const uint *no_data, uint no_data_begin,
-    global BlockEntry *table, global ulong *inside, global SlotValue *cache_values,
-    global const PassCounts *prev, global PassCounts *counts, global uint *active_ray_ids,
-    global uint *next_active_ray_ids, global uint *ray_block_ids, global HitRecord *hits,
-    global uint *slot_block_ids, global uint *slot_stamps, global uint *requested_bits,
-    global const uint *free_slots, global CacheState *cache) {
+    const FrameParams frame_params, const ClipParams clip, uint begins, uint bands_behind,
+    global const uint *part_0, global const uint *part_1, global const uint *part_2,
+    global const uint *part_3, global const uint *index, const StreamLayout layout,
+    global const uint *macrocell_masks, global const ushort *ranges, global const uint *no_data,
+    uint no_data_begin, global BlockEntry *table, global ulong *inside,
+    global SlotValue *cache_values, global const PassCounts *prev, global PassCounts *counts,
+    global uint *active_ray_ids, global uint *next_active_ray_ids, global uint *ray_block_ids,
+    global HitRecord *hits, global uint *slot_block_ids, global uint *slot_stamps,
+    global uint *requested_bits, global const uint *free_slots, global CacheState *cache) {
   const FrameParams *frame = &frame_params;
   local uint slots[8 * ISO_GROUP_SIZE];
   OpenedBlock opened[ISO_OPENED_BLOCKS];
@@ -549,7 +571,7 @@ kernel __attribute__((reqd_work_group_size(1, 1, 1))) void march_packets(
       Packet p;
       progress.met = progress.moved = ints(0);
       p.waits = p.found.lanes = ints(0);
-      draw_packet(&p, &scene, is_active_somewhere, source, begins, &rays);
+      draw_packet(&p, &scene, &clip, is_active_somewhere, source, begins, &rays);
     }
   }
   end_streams();

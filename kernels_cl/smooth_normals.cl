@@ -158,7 +158,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void smooth_n
     BlockCoords base = {0, 0, 0};
     if (i < num_rays)
       pixel = begins ? tiled_pixel(frame, box, i) : unpack_entry(active_ray_ids[i]).pixel;
-    if (pixel != ISO_INVALID_ID) block_id = hits[pixel].block_id;
+    if (pixel != ISO_INVALID_ID && (hits[pixel].cell & ISO_CAP) == 0)
+      block_id = hits[pixel].block_id;
     if (block_id != ISO_INVALID_ID) {
       ISO_FRAME_OF(level, block_id);
       const BlockCoords b = block_coords(level, block_id);

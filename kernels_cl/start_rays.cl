@@ -35,6 +35,7 @@ ISO_INLINE void clear_hits(global uint *words, uint count) {
 /// begins_frame  1: and with it a frame, for the stamps of cache slots (slot_stamps.h)
 /// frames  [num_frames] with levels of detail, those that draw, the finest first; frame_params is
 ///         the first of them
+/// clip    of the camera's rays, if ISO_CLIP is 1
 /// given   [pixel] the rays, if ISO_GIVEN_RAYS is 1
 /// ranges  of the blocks of all levels
 /// no_data, no_data_begin  as lacks_data_at_border
@@ -47,11 +48,12 @@ ISO_INLINE void clear_hits(global uint *words, uint count) {
 /// Launch  groups of ISO_GROUP_SIZE, which stride over the tiles of the screen box; in as many
 ///         parts, one after the other, as `parts` says (ocl::Range)
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_rays(
-    const FrameParams frame_params, global const FrameParams *frames, uint num_frames, uint parts,
-    uint begins_frame, global const GivenRay *given, global const uint *macrocell_masks,
-    global const ushort *ranges, global const uint *no_data, uint no_data_begin,
-    global PassCounts *counts, global PassCounts *next, global uint *next_active_ray_ids,
-    global uint *ray_block_ids, global ISO_WORDS(HitRecord) *hit_words) {
+    const FrameParams frame_params, global const FrameParams *frames, uint num_frames,
+    const ClipParams clip, uint parts, uint begins_frame, global const GivenRay *given,
+    global const uint *macrocell_masks, global const ushort *ranges, global const uint *no_data,
+    uint no_data_begin, global PassCounts *counts, global PassCounts *next,
+    global uint *next_active_ray_ids, global uint *ray_block_ids,
+    global ISO_WORDS(HitRecord) *hit_words) {
   const FrameParams *frame = &frame_params;
   local uint found[ISO_GROUP_SIZE], counters[2];
   const PixelBox box = {frame->screen.begin_x, frame->screen.begin_y, frame->screen.end_x,
@@ -80,14 +82,13 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_ra
     uint stand = ISO_INVALID_ID, log_ahead = ISO_FIRST_LOG_AHEAD;
     if (pixel != ISO_INVALID_ID && has_ray(given, pixel)) {
       ISO_FIRST_FRAME_OF(level, pixel);
-      const Ray ray = ray_of(level, given, pixel);
-      uint block_id = first_block(level, &ray);
-      if (block_id != ISO_INVALID_ID &&
-          find_blocks(level, macrocell_masks, &ray, &block_id, 1, found + item, 1) != 0) {
-        stand = found[item];
-      } else {
-        stand = cross_borders(frames, num_frames, macrocell_masks, ranges, no_data, no_data_begin,
-                              pixel, 0, ISO_SIDE_UNKNOWN, found + item);
+      const Ray ray = ray_of(level, &clip, given, pixel);
+      if (!ISO_CLIP || has_interval(&ray))
+        stand = begin_in_level(level, &ray, macrocell_masks, ranges, no_data, no_data_begin,
+                               side_where_cut(&clip, &ray), found + item);
+      if (stand == ISO_INVALID_ID) {
+        stand = cross_borders(frames, num_frames, &clip, macrocell_masks, ranges, no_data,
+                              no_data_begin, pixel, 0, ISO_SIDE_UNKNOWN, found + item);
         log_ahead = ISO_BORDER_LOG_AHEAD;
       }
       if (stand != ISO_INVALID_ID) ray_block_ids[pixel] = stand;

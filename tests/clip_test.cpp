@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <random>
 #include <vector>
 
@@ -150,25 +151,70 @@ void for_volumes(Draw draw) {
   draw(pyramid_of(info, gaps), 0.4f);
 }
 
-TEST(ClippedOnTheHost, FramesAreTheTwins) {
+/// Draws with a renderer that Make makes of a volume.
+template <class Make>
+Seen check_renderer(Make make) {
   Seen sum;
   for_volumes([&](const CompressedVolume &volume, float isovalue) {
-    HostRenderer renderer(volume);
+    const auto renderer = make(volume);
     for (const double voxel_pixels : {0.0, 1.5, 4.0}) {
       const Seen seen = check(
           volume, isovalue, voxel_pixels,
           [&](const FrameRequest &request) {
-            renderer.render(request);
-            return renderer.hits();
+            renderer->render(request);
+            return renderer->hits();
           },
-          [&] { return renderer.open(); });
+          [&] { return renderer->open(); });
       sum.hits += seen.hits;
       sum.caps += seen.caps;
       sum.not_as_whole += seen.not_as_whole;
       sum.open += seen.open;
     }
   });
-  expect_seen(sum);
+  return sum;
+}
+
+TEST(ClippedOnTheHost, FramesAreTheTwins) {
+  expect_seen(check_renderer(
+      [](const CompressedVolume &volume) { return std::make_unique<HostRenderer>(volume); }));
+}
+
+class ClippedOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
+ protected:
+  Seen check_device(RendererOptions options) {
+    options.size = kSize;
+    options.with_levels = options.with_given_rays = true;
+    return check_renderer([&](const CompressedVolume &volume) {
+      return std::make_unique<DeviceRenderer>(device_, volume, options);
+    });
+  }
+
+  ocl::Device device_{GetParam()};
+};
+INSTANTIATE_TEST_SUITE_P(Devices, ClippedOnDevice, testing::ValuesIn(devices_under_test()),
+                         device_test_name);
+
+TEST_P(ClippedOnDevice, FramesAreTheTwins) {
+  expect_seen(check_device({}));
+}
+
+/// With so few slots that most rays wait, and go on one by one.
+TEST_P(ClippedOnDevice, FramesOfASmallCacheAreTheTwins) {
+  expect_seen(check_device({.cache_slots = 40}));
+}
+
+TEST_P(ClippedOnDevice, FramesWithoutPacketsAreTheTwins) {
+  expect_seen(check_device({.packets = RayPackets::kOff}));
+}
+
+/// Pipeline `blocks` is the paper's.
+TEST_P(ClippedOnDevice, PipelineBlocksRefuses) {
+  const VolumeInfo info = placed_grid({9, 9, 9});
+  const auto volume = pyramid_of(info, test::sample(info.dims, test::gyroid_field(3)));
+  DeviceRenderer renderer(device_, volume, {.size = kSize, .pipeline = blocks_pipeline()});
+  FrameRequest request{.camera = orbit_cameras(info, 1)[0], .isovalue = 0.4f};
+  request.clip.planes.push_back({{1, 0, 0}, 5});
+  EXPECT_THAT([&] { renderer.render(request); }, ThrowsMessage<Error>(HasSubstr("leave out clip")));
 }
 
 }  // namespace

@@ -61,8 +61,7 @@ inline bool trace_bands(std::span<const HostLevel> levels, uint ray_id, HitRecor
     const LastPlanes last = last_planes(&level.frame);
     const Ray ray = ray_of_level(level, ray_id);
     if (!has_interval(&ray)) continue;
-    if (ray.cut_by != ISO_NOT_CUT)
-      before = begins_at_cap(level.clip, &ray) ? ISO_SIDE_OUTSIDE : ISO_SIDE_UNKNOWN;
+    if (ray.cut_by != ISO_NOT_CUT) before = side_where_cut(level.clip, &ray);
     BlockCoords cell;
     if (before != ISO_SIDE_UNKNOWN) {
       const uint side = kSide(level, ray, last, ray.begin_t, &cell);

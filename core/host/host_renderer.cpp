@@ -87,11 +87,6 @@ FrameStats HostRenderer::render(const FrameRequest &request) {
   const std::vector<FrameParams> frames = make_level_frames(levels_.infos(), request.camera, size,
                                                             request.isovalue, request.voxel_pixels);
   std::vector<HostLevel> drawing = levels_.open(frames, request.voxel_error, request.bound);
-  const ClipParams clip =
-      make_clip_params(info_, frames.front().view, request.camera, request.clip);
-  if (clip.num_planes != 0) {
-    for (HostLevel &level : drawing) level.clip = &clip;
-  }
   frame_ = frames.front();
   size_ = size;
   open_ = {};
@@ -99,6 +94,13 @@ FrameStats HostRenderer::render(const FrameRequest &request) {
   stats.first_level =
       static_cast<std::size_t>(std::ranges::find_if(frames, draws) - frames.begin());
   stats.last_level = stats.first_level + drawing.size() - 1;
+  const ClipParams clip =
+      make_clip_params(info_, frames.front().view, request.camera, request.clip);
+  if (clip.num_planes != 0) {
+    for (HostLevel &level : drawing) level.clip = &clip;
+    // Caps lie outside the box of active blocks, too.
+    drawing.front().frame.screen = frames[stats.first_level].screen;
+  }
   try {
     draw_bands(request, drawing, stats);
     if (request.ambient_rays != 0 && !stats.cancelled) add_ambient(request, drawing, stats);

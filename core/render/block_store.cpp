@@ -124,8 +124,9 @@ void BlockStore::open(Wavefront &rays, std::vector<FrameParams> frames,
       const auto stage = device.timer().stage("macrocells");
       level.macrocells.select(frame, level.range_error, &level.stream);
       frame.surface = level.macrocells.surface(frame);
-      // If there are several bands, a ray may begin at a border that lies outside the box.
-      if (!has_bands && source == RaySource::kCamera) frame.screen = make_screen_box(frame);
+      // A ray may begin outside the box: at a border between bands, or at a cap.
+      if (!has_bands && source == RaySource::kCamera && !rays.is_clipped())
+        frame.screen = make_screen_box(frame);
     }
     level.frame = frame;
   }

@@ -14,6 +14,7 @@
 #include "core/render/surface_camera.hpp"
 #include "core/view/detail.hpp"
 #include "kernels_cl/portable/block_grid.h"
+#include "kernels_cl/portable/clip.h"
 #include "kernels_cl/portable/window.h"
 
 namespace isowave::core {
@@ -68,7 +69,8 @@ FrameStats DeviceRenderer::render(const FrameRequest &request) {
   took_one_pass = frame.stats.passes.size() == 1;
   if (is_smooth) run(normals_of_camera_, frame);
   if (request.ambient_rays != 0)
-    ambient_->begin(blocks_.levels[blocks_.drawing.first].info, request.ambient_rays);
+    ambient_->begin(blocks_.levels[blocks_.drawing.first].info, blocks_.drawing.first,
+                    request.ambient_rays);
   for (std::uint32_t round = 0; round < request.ambient_rays; ++round) cast_round(round, frame);
   FrameStats &stats = frame.stats;
   if (request.ambient_rays != 0 && !stats.cancelled) (*ambient_)(rays_, request.ambient_rays);
@@ -202,6 +204,7 @@ Abilities DeviceRenderer::abilities_of(const RendererOptions &options) {
   abilities.most_rays = options.size.num_rays();
   abilities.levels = options.with_levels;
   abilities.fewer_planes = true;
+  abilities.clipping = options.pipeline->has_clipping();
   abilities.bounds = options.with_bounds;
   abilities.given_rays = options.with_given_rays;
   abilities.kept_picture = options.with_kept_picture;
@@ -232,6 +235,8 @@ void DeviceRenderer::begin_frame(const FrameRequest &request) {
   has_picture_ = false;
   size_ = size;
   rays_.num_ambient = 0;
+  rays_.clip =
+      make_clip_params(blocks_.levels[0].info, frames.front().view, request.camera, request.clip);
   open_frame(std::move(frames), values, request.bound, RaySource::kCamera);
 }
 
@@ -423,7 +428,7 @@ std::vector<std::uint64_t> DeviceRenderer::blocked_rays(std::uint32_t round,
                                                         std::uint32_t num_rounds,
                                                         LaterPasses &stats) {
   rays_.frame = blocks_.level_frames->front();
-  ambient_->begin(blocks_.levels[blocks_.drawing.first].info, num_rounds);
+  ambient_->begin(blocks_.levels[blocks_.drawing.first].info, blocks_.drawing.first, num_rounds);
   const OnPass never_stops;
   Frame frame{never_stops, 1};
   cast_round(round, frame);
@@ -431,9 +436,17 @@ std::vector<std::uint64_t> DeviceRenderer::blocked_rays(std::uint32_t round,
   rays_.frame = blocks_.levels[0].frame;  // for shading
   std::vector<HitRecord> met(size_.num_rays());
   rays_.given_hits.read(met);
+  std::vector<GivenRay> given(rays_.is_clipped() ? met.size() : 0);
+  if (!given.empty()) rays_.given.read(given);
   std::vector<std::uint64_t> blocked((met.size() + 63) / 64);
   for (std::size_t ray = 0; ray < met.size(); ++ray) {
-    const bool meets = met[ray].t != std::numeric_limits<float>::infinity();
+    bool meets = met[ray].t != std::numeric_limits<float>::infinity();
+    if (meets && !given.empty()) {
+      const float in_first = std::ldexp(1.0f, static_cast<int>(given[ray].level)),
+                  voxel = std::ldexp(in_first, static_cast<int>(blocks_.drawing.first));
+      const float t_scale = blocks_.level_frames->front().view.t_scale * in_first;
+      meets = !is_clipped(&rays_.clip, given[ray], voxel, met[ray].t / t_scale);
+    }
     blocked[ray / 64] |= std::uint64_t{meets} << ray % 64;
   }
   blocks_.close(passes.recycled_blocks, true);

@@ -39,6 +39,8 @@ class Pipeline {
   virtual std::string_view name() const = 0;
   /// Whether it draws several levels of detail.
   virtual bool has_levels() const = 0;
+  /// Whether it draws clipped volumes.
+  virtual bool has_clipping() const { return false; }
   /// Adds the arrays of a Wavefront that its rays need.
   virtual void add_to(Wavefront::Limits &limits) const = 0;
   /// The buffers of its wave beside those of BlockStore and Wavefront.

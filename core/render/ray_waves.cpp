@@ -41,7 +41,7 @@ void RaysWave::enqueue_pass() {
   blocks_.provide(rays_);
   {
     const auto stage = timer.stage("march");
-    if (in_packets() && !draws_levels(rays_)) {
+    if (in_packets() && !has_bands()) {
       (*march_packets_)(macrocells(), blocks_.levels[0].stream, blocks_.cache, rays_);
     } else if (in_packets() && march_packets_->begins()) {
       std::vector<MarchPackets::Band> bands;
@@ -84,6 +84,7 @@ class RaysPipeline : public Pipeline {
  public:
   std::string_view name() const override { return "rays"; }
   bool has_levels() const override { return true; }
+  bool has_clipping() const override { return true; }
   void add_to(Wavefront::Limits & /*limits*/) const override {}
   ocl::BufferSizes sizes(const WaveLimits & /*limits*/) const override { return {}; }
   std::unique_ptr<Wave> make_wave(BlockStore &blocks, Wavefront &rays, const WaveLimits &limits,

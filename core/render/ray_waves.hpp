@@ -44,17 +44,18 @@ class RaysWave : public Wave {
  private:
   void start(bool begins_frame);
   const Macrocells &macrocells() const { return blocks_.levels[0].macrocells; }
-  /// Whether the rays of the frame at work go in packets; those of several levels of detail in the
-  /// first pass alone.
-  bool in_packets() const { return march_packets_ && (bands_in_packets_ || !draws_levels(rays_)); }
+  /// Whether rays begin and end in bands of levels of detail, or where they are clipped.
+  bool has_bands() const { return draws_levels(rays_) || rays_.is_clipped(); }
+  /// Whether the rays of the frame at work go in packets; those with bands in the first pass alone.
+  bool in_packets() const { return march_packets_ && (bands_in_packets_ || !has_bands()); }
 
   BlockStore &blocks_;
   Wavefront &rays_;
   StartRays start_rays_;
   March march_;
   std::optional<MarchPackets> march_packets_;  ///< instead of start_rays_ and march_
-  bool bands_in_packets_ = false;  ///< also in frames of several levels, since blocks are decoded
-                                   ///< on demand
+  bool bands_in_packets_ =
+      false;  ///< also in frames with bands, since blocks are decoded on demand
   RequestAhead request_ahead_;
 };
 

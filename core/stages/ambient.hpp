@@ -18,8 +18,9 @@ class Ambient {
 
   /// Before the rounds of a frame.
   ///
+  /// level  the finest level of detail that draws, whose grid is `info`
   /// Waits  if the number of rays differs from that of the frame before
-  void begin(const VolumeInfo &info, std::uint32_t num_rays);
+  void begin(const VolumeInfo &info, std::size_t level, std::uint32_t num_rays);
 
   /// Counts the rays of round - 1 that met nothing, and makes the rays of a round, unless it is the
   /// last: begin()'s num_rays.
@@ -34,6 +35,7 @@ class Ambient {
   ocl::Buffer<AmbientDirection> directions_;
   std::uint32_t num_rays_ = 0;
   AmbientParams params_{};
+  uint level_ = 0;
   LevelledKernel<kernels::ambient> kernel_;
 };
 

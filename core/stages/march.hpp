@@ -28,7 +28,7 @@ class March {
  private:
   RaySource source_;
   ocl::Range range_;
-  LevelledKernel<kernels::march> kernel_;
+  ClippedKernel<kernels::march> kernel_;
 };
 
 }  // namespace isowave::core

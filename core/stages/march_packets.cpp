@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "core/stages/levelled_kernel.hpp"
 #include "core/stages/solver_defines.hpp"
 #include "kernels_cl/portable/ray_state.h"
 
@@ -65,7 +66,7 @@ void MarchPackets::march(ocl::Kernel<kernels::march_packets> &kernel, const Fram
   const auto part = [&](std::size_t i) -> const ocl::Buffer<uint> & {
     return on_demand_ ? stream.part(i) : none;
   };
-  kernel(range_, frame, begin.of, begin.bands_behind, part(0), part(1), part(2), part(3),
+  kernel(range_, frame, rays.clip, begin.of, begin.bands_behind, part(0), part(1), part(2), part(3),
          on_demand_ ? stream.index() : none, stream.layout, macrocells.masks(), macrocells.ranges(),
          macrocells.no_data().words_or(none), macrocells.no_data().begin, cache.table, cache.inside,
          cache.values, rays.previous_counts, rays.counts, rays.active_ray_ids,
@@ -86,14 +87,12 @@ void MarchPackets::operator()(const Macrocells &macrocells, std::span<const Band
   uint begins = ISO_BEGINS_FRAME;
   open(cache, rays, begins);
   for (const Band &band : bands) {
-    ocl::Defines defines = band.stream.defines();
-    const auto found = march_bands_.find(defines);
-    auto &kernel = found != march_bands_.end()
-                       ? found->second
-                       : march_bands_
-                             .try_emplace(std::move(defines), device_,
-                                          with_levels(with_stream(defines_, &band.stream), true))
-                             .first->second;
+    ocl::Defines defines = with_levels(with_stream(defines_, &band.stream), true);
+    if (rays.is_clipped()) defines = with_clip(std::move(defines));
+    auto found = march_bands_.find(defines);
+    if (found == march_bands_.end())
+      found = march_bands_.try_emplace(defines, device_, defines).first;
+    ocl::Kernel<kernels::march_packets> &kernel = found->second;
     FrameParams frame = band.frame;
     frame.screen = bands.front().frame.screen;  // packets beside it have drawn nothing
     const auto behind = static_cast<uint>(&bands.back() - &band);

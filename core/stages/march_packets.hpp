@@ -44,8 +44,8 @@ class MarchPackets {
     const DeviceStream &stream;
     const FrameParams &frame;
   };
-  /// The first pass of a frame that several levels draw, with blocks decoded on demand. Rays that
-  /// wait then go on as March has it.
+  /// The first pass of a frame that is clipped or that several levels draw, with blocks decoded on
+  /// demand. Rays that wait then go on as March has it.
   ///
   /// bands       of the levels that draw, the finest first; their streams are whole on the device
   /// macrocells  of any level, since levels share what is used of them
@@ -84,7 +84,7 @@ class MarchPackets {
   bool begins_ = false;  ///< the next pass is the first of its frame
   ocl::Kernel<kernels::open_packets> open_;
   ocl::Kernel<kernels::march_packets> march_;
-  /// For bands, by the defines of their streams.
+  /// For bands, by their defines.
   std::map<ocl::Defines, ocl::Kernel<kernels::march_packets>> march_bands_;
 };
 

@@ -27,7 +27,7 @@ class RequestAhead {
 
  private:
   ocl::Range range_;
-  LevelledKernel<kernels::request_ahead> kernel_;
+  ClippedKernel<kernels::request_ahead> kernel_;
 };
 
 }  // namespace isowave::core

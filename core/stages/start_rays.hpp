@@ -27,7 +27,7 @@ class StartRays {
  private:
   RaySource source_;
   ocl::Range range_;
-  LevelledKernel<kernels::start_rays> kernel_;
+  ClippedKernel<kernels::start_rays> kernel_;
 };
 
 }  // namespace isowave::core

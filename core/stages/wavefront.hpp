@@ -71,6 +71,9 @@ struct Wavefront {
     std::swap(previous_counts, counts);
   }
 
+  /// Is a part of the volume not drawn?
+  bool is_clipped() const { return clip.num_planes != 0; }
+
   /// The hits of the rays of a source.
   ocl::Buffer<HitRecord> &hits_of(RaySource source) {
     return source == RaySource::kGiven ? given_hits : hits;
@@ -78,7 +81,8 @@ struct Wavefront {
 
   std::uint64_t num_rays;  ///< R
   FrameParams
-      frame{};  ///< of the frame at work; of several levels of detail, the finest that draws
+      frame{};        ///< of the frame at work; of several levels of detail, the finest that draws
+  ClipParams clip{};  ///< of the frame at work
   ocl::Buffer<FrameParams>
       level_frames;  ///< [num_level_frames] of all that draw (pipeline `rays` with several)
   std::uint32_t num_level_frames = 1;

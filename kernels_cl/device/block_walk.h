@@ -41,7 +41,7 @@ ISO_INLINE GridWalk enter_macrocell(const Ray *ray, const GridWalk *coarse, RayE
 
 /// Walks on from block *block_id, within the box of active blocks, to the next `wanted` active
 /// blocks, into found [wanted], `stride` apart. Returns how many there are before the ray has left
-/// the box, or its band; *block_id becomes the first block not looked at, or ISO_INVALID_ID.
+/// the box, or its interval; *block_id becomes the first block not looked at, or ISO_INVALID_ID.
 ISO_INLINE uint find_blocks(const FrameParams *frame, global const uint *macrocell_masks,
                             const Ray *ray, uint *block_id, uint wanted, ISO_FOUND uint *found,
                             uint stride) {
@@ -77,7 +77,7 @@ ISO_INLINE uint find_blocks(const FrameParams *frame, global const uint *macroce
           found[stride * k++] = block_id_at(frame, (uint)w.x, (uint)w.y, (uint)w.z);
         }
         exit = walk_exit(&w, ray);
-        left = leaves(&w, &coarse, exit) || ends_band(frame, exit);
+        left = leaves(&w, &coarse, exit) || ends_ray(ray, exit);
         walk_step(&w, ray, exit, 4, last);
       }
     } else {
@@ -85,7 +85,7 @@ ISO_INLINE uint find_blocks(const FrameParams *frame, global const uint *macroce
       left = 1;
     }
     follows = (low | high) != 0;
-    if (left && ends_band(frame, exit)) {
+    if (left && ends_ray(ray, exit)) {
       within = 0;
     } else if (left) {
       walk_step(&coarse, ray, exit, 4 * ISO_MACROCELL_BLOCKS, last);
@@ -96,12 +96,12 @@ ISO_INLINE uint find_blocks(const FrameParams *frame, global const uint *macroce
   return k;
 }
 
-/// The block in which a ray, or its band, enters the box of active blocks, or starts in it;
+/// The block in which a ray enters the box of active blocks, or begins in it;
 /// ISO_INVALID_ID if it does not meet the box.
 ISO_INLINE uint first_block(const FrameParams *frame, const Ray *ray) {
   const LastPlanes last = last_planes(frame);
   LastPlanes begin, end;
-  RayEvent enter = band_begin(frame), exit = band_end(frame);
+  RayEvent enter = ray_begin(ray), exit = ray_end(ray);
   begin.x = 4 * frame->surface.active_begin_x;
   begin.y = 4 * frame->surface.active_begin_y;
   begin.z = 4 * frame->surface.active_begin_z;
@@ -116,13 +116,13 @@ ISO_INLINE uint first_block(const FrameParams *frame, const Ray *ray) {
 }
 
 /// The block behind block b on the ray, or ISO_INVALID_ID behind all active ones, or the ray's
-/// band.
+/// interval.
 ISO_INLINE uint block_behind(const FrameParams *frame, const Ray *ray, BlockCoords b,
                              LastPlanes last) {
   GridWalk w = walk_from(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
   const RayEvent exit = walk_exit(&w, ray);
   walk_step(&w, ray, exit, 4, last);
-  return !ends_band(frame, exit) && w.x >= frame->surface.active_begin_x &&
+  return !ends_ray(ray, exit) && w.x >= frame->surface.active_begin_x &&
                  w.x < frame->surface.active_end_x && w.y >= frame->surface.active_begin_y &&
                  w.y < frame->surface.active_end_y && w.z >= frame->surface.active_begin_z &&
                  w.z < frame->surface.active_end_z

@@ -1,5 +1,6 @@
-/// level_band.h -- the part of a ray that one level of detail draws (core/view/detail.hpp). OpenCL
-/// C 1.2. If ISO_BANDS is 0, that is all of the ray, and nothing here costs anything.
+/// level_band.h -- the interval of a ray in a level of detail (core/view/detail.hpp), clipped
+/// (clip.h). OpenCL C 1.2. If ISO_INTERVALS is 0, that is all of the ray, and nothing here costs
+/// anything.
 #ifndef ISOWAVE_LEVEL_BAND_H
 #define ISOWAVE_LEVEL_BAND_H
 
@@ -11,38 +12,38 @@ ISO_INLINE uint masks_begin(const FrameParams *frame) {
   return ISO_LEVELS ? frame->place.masks_begin : 0u;
 }
 
-ISO_INLINE RayEvent band_begin(const FrameParams *frame) {
-  return border_event(ISO_BANDS ? frame->band.begin_t : 0.0f);
+ISO_INLINE RayEvent ray_begin(const Ray *ray) {
+  return border_event(ISO_INTERVALS ? ray->begin_t : 0.0f);
 }
-ISO_INLINE RayEvent band_end(const FrameParams *frame) {
-  return border_event(ISO_BANDS ? frame->band.end_t : INFINITY);
-}
-
-/// Is `exit` beyond the band?
-ISO_INLINE int ends_band(const FrameParams *frame, RayEvent exit) {
-  return ISO_BANDS && !event_before(exit, band_end(frame));
+ISO_INLINE RayEvent ray_end(const Ray *ray) {
+  return border_event(ISO_INTERVALS ? ray->end_t : INFINITY);
 }
 
-/// The beginning of the ray's band, if the ray has not entered the region before.
-ISO_INLINE RayEvent band_entry(const FrameParams *frame, RayEvent entry) {
-  return ISO_BANDS && event_before(entry, band_begin(frame)) ? band_begin(frame) : entry;
+/// Is `exit` beyond the ray's interval?
+ISO_INLINE int ends_ray(const Ray *ray, RayEvent exit) {
+  return ISO_INTERVALS && !event_before(exit, ray_end(ray));
 }
 
-/// The end of the ray's band, if it comes before the ray leaves the region.
-ISO_INLINE RayEvent band_exit(const FrameParams *frame, RayEvent exit) {
-  return ends_band(frame, exit) ? band_end(frame) : exit;
+/// The beginning of the ray, if it has not entered the region before.
+ISO_INLINE RayEvent ray_entry(const Ray *ray, RayEvent entry) {
+  return ISO_INTERVALS && event_before(entry, ray_begin(ray)) ? ray_begin(ray) : entry;
 }
 
-/// Does the ray stand at a border, with a side that it was on before?
+/// The end of the ray, if it comes before the ray leaves the region.
+ISO_INLINE RayEvent ray_exit(const Ray *ray, RayEvent exit) {
+  return ends_ray(ray, exit) ? ray_end(ray) : exit;
+}
+
+/// Does the ray stand where it begins in a level, with a side that it was on before?
 ISO_INLINE int has_side(uint side) {
-  return ISO_BANDS && side != ISO_SIDE_UNKNOWN;
+  return ISO_INTERVALS && side != ISO_SIDE_UNKNOWN;
 }
 
-/// The place where a ray stands: without levels a block, and no side.
+/// The place where a ray stands: without intervals a block, and no side.
 ISO_INLINE RayStand read_stand(uint stand) {
   RayStand at;
-  at.block_id = ISO_LEVELS ? unpack_stand(stand).block_id : stand;
-  at.side = ISO_LEVELS ? unpack_stand(stand).side : ISO_SIDE_UNKNOWN;
+  at.block_id = ISO_LEVELS || ISO_CLIP ? unpack_stand(stand).block_id : stand;
+  at.side = ISO_LEVELS || ISO_CLIP ? unpack_stand(stand).side : ISO_SIDE_UNKNOWN;
   return at;
 }
 

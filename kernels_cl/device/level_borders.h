@@ -8,6 +8,7 @@
 #include "block_walk.h"
 #include "portable/level_border.h"
 #include "portable/no_data.h"
+#include "ray_source.h"
 
 /// The level of detail that has the block with this id, of those that draw a frame, frames
 /// [num_frames], the finest first.
@@ -56,44 +57,69 @@ ISO_INLINE int lacks_data_at_border(const FrameParams *frame, global const uint 
   return 0;
 }
 
-/// The place at which a ray stands after it has left the band of frames[level]; ISO_INVALID_ID:
-/// there is nothing for it behind. If the block behind the border is not as a whole on the ray's
-/// side, the ray stands there, with its side. Otherwise it stands at the next active block, in this
-/// band or one behind. The ray has no side if data lack before or behind the border.
+/// The place at which a ray stands when it begins in a level; ISO_INVALID_ID: there is nothing for
+/// it in its interval there. If the block in which it begins is not as a whole on the ray's side,
+/// the ray stands there, with its side. Otherwise it stands at the next active block. The ray has
+/// no side if data lack where it begins.
 ///
-/// side     side on which the ray left; unknown: the border is in a block that is as a whole on one
-///          side, or in a cell without data
+/// side     side on which the ray was before, or unknown
 /// ranges   ranges of all levels' blocks
 /// no_data  as lacks_data_at_border
 /// found    [1] scratch
+ISO_INLINE uint begin_in_level(const FrameParams *frame, const Ray *ray,
+                               global const uint *macrocell_masks, global const ushort *ranges,
+                               global const uint *no_data, uint no_data_begin, uint side,
+                               local uint *found) {
+  BlockCoords b;
+  if (has_side(side) && block_at_border(frame, ray, ray->begin_t, &b) &&
+      side_of_block(frame, macrocell_masks, ranges, b) != side &&
+      !lacks_data_at_border(frame, no_data, no_data_begin, ray, ray->begin_t))
+    return pack_stand(block_id_at(frame, b.x, b.y, b.z), side);
+  uint block_id = first_block(frame, ray);
+  return block_id != ISO_INVALID_ID &&
+                 find_blocks(frame, macrocell_masks, ray, &block_id, 1, found, 1) != 0
+             ? found[0]
+             : ISO_INVALID_ID;
+}
+
+/// The side of the whole block in which a ray is at the end of a level's band; unknown if it is not
+/// in the domain there, the block is active, or data lack.
+ISO_INLINE uint side_at_end(const FrameParams *frame, global const uint *macrocell_masks,
+                            global const ushort *ranges, global const uint *no_data,
+                            uint no_data_begin, uint pixel) {
+  const Ray ray = make_ray(frame, pixel);
+  BlockCoords b;
+  return block_at_border(frame, &ray, frame->band.end_t, &b) &&
+                 !lacks_data_at_border(frame, no_data, no_data_begin, &ray, frame->band.end_t)
+             ? side_of_block(frame, macrocell_masks, ranges, b)
+             : ISO_SIDE_UNKNOWN;
+}
+
+/// The place at which a ray stands after it has left the band of frames[level], in a band behind:
+/// begin_in_level() of the first that has one.
+///
+/// clip  as ray_of()
+/// side  side on which the ray left; unknown: the border is in a block that is as a whole on one
+///       side, or in a cell without data
 ISO_INLINE uint cross_borders(global const FrameParams *frames, uint num_frames,
-                              global const uint *macrocell_masks, global const ushort *ranges,
-                              global const uint *no_data, uint no_data_begin, uint pixel,
-                              uint level, uint side, local uint *found) {
+                              const ClipParams *clip, global const uint *macrocell_masks,
+                              global const ushort *ranges, global const uint *no_data,
+                              uint no_data_begin, uint pixel, uint level, uint side,
+                              local uint *found) {
   uint stand = ISO_INVALID_ID;
   for (; ISO_BANDS && level + 1 < num_frames && stand == ISO_INVALID_ID; ++level) {
     const FrameParams behind = frames[level + 1];
-    const Ray ray = make_ray(&behind, pixel);
+    const Ray ray = camera_ray(&behind, clip, pixel);
     BlockCoords b;
-    const int is_at_border = block_at_border(&behind, &ray, behind.band.begin_t, &b);
-    if (is_at_border && side == ISO_SIDE_UNKNOWN) {
+    if (ISO_CLIP && ray.cut_by != ISO_NOT_CUT) {
+      side = side_where_cut(clip, &ray);
+    } else if (side == ISO_SIDE_UNKNOWN && block_at_border(&behind, &ray, ray.begin_t, &b)) {
       const FrameParams before = frames[level];
-      const Ray ray_before = make_ray(&before, pixel);
-      BlockCoords left;
-      if (block_at_border(&before, &ray_before, before.band.end_t, &left) &&
-          !lacks_data_at_border(&before, no_data, no_data_begin, &ray_before, before.band.end_t))
-        side = side_of_block(&before, macrocell_masks, ranges, left);
+      side = side_at_end(&before, macrocell_masks, ranges, no_data, no_data_begin, pixel);
     }
-    if (is_at_border && side != ISO_SIDE_UNKNOWN &&
-        side_of_block(&behind, macrocell_masks, ranges, b) != side &&
-        !lacks_data_at_border(&behind, no_data, no_data_begin, &ray, behind.band.begin_t)) {
-      stand = pack_stand(block_id_at(&behind, b.x, b.y, b.z), side);
-    } else {
-      uint block_id = first_block(&behind, &ray);
-      if (block_id != ISO_INVALID_ID &&
-          find_blocks(&behind, macrocell_masks, &ray, &block_id, 1, found, 1) != 0)
-        stand = found[0];
-    }
+    if (!ISO_CLIP || has_interval(&ray))
+      stand = begin_in_level(&behind, &ray, macrocell_masks, ranges, no_data, no_data_begin, side,
+                             found);
     side = ISO_SIDE_UNKNOWN;
   }
   return stand;

@@ -7,6 +7,7 @@
 #include "portable/block_cells.h"
 #include "portable/block_table.h"
 #include "portable/cell_intersect.h"
+#include "portable/clip.h"
 #include "slot_values.h"
 
 /// The cache (block_cache.cl), as a work-item looks into it.
@@ -24,9 +25,9 @@ typedef struct CacheReader {
 #define ISO_RAY_HIT 1           ///< equal to what isolate() returns, as is
 #define ISO_RAY_DOUBT 2         ///< the next march settles it
 #define ISO_RAY_WAITS 3         ///< for a block that is not cached
-#define ISO_RAY_ENDS_OUTSIDE 4  ///< its band ends here
+#define ISO_RAY_ENDS_OUTSIDE 4  ///< its interval ends here
 #define ISO_RAY_ENDS_INSIDE 5
-#define ISO_RAY_ENDS_WITHOUT_DATA 6  ///< it is on neither side
+#define ISO_RAY_ENDS 6  ///< the same, on neither side, or on which does not matter
 #if ISO_RAY_DOUBT != ISO_DOUBTFUL
 #error "a result of isolate() must stand for itself"
 #endif
@@ -43,11 +44,11 @@ typedef struct BlockChange {
   CellChange change;
   CellWalk at;
   float w[8];
-  int at_border;  ///< the change is where the cell is entered, since two levels of detail disagree
+  int at_border;  ///< the change is where the ray begins: two levels disagree, or it is a cap
 } BlockChange;
 
 ISO_INLINE int changes_at_border(const BlockChange *found) {
-  return ISO_BANDS && found->at_border;
+  return ISO_INTERVALS && found->at_border;
 }
 
 /// The cells of a block that have voxels of any of those corners.
@@ -117,13 +118,18 @@ ISO_INLINE void stamp_block(const CacheReader *cache) {
   cache->slot_stamps[cache->slots[0]] = cache->stamp;
 }
 
+/// Does a ray that ends here say on which side it is?
+ISO_INLINE int tells_side(int ends) {
+  return ISO_BANDS && ends;
+}
+
 /// Walks the cells of block b, and stamps it if it is cached.
 ///
 /// precise  doubts are settled on the spot
-/// side     where the ray was before the border at which its band begins in this block
-/// may_end  the ray's band may end in this block
+/// side     where the ray was before it begins in this block
+/// may_end  the ray may end in this block
 /// Returns  ISO_RAY_LEFT (the block), ISO_RAY_HIT, ISO_RAY_DOUBT, ISO_RAY_WAITS if a block of the
-///          dual grid is not cached, or how the ray's band ends
+///          dual grid is not cached, or how the ray ends
 ISO_INLINE int march_block(const FrameParams *frame, const CacheReader *cache, const Ray *ray,
                            LastPlanes last, BlockCoords b, int precise, uint side, int may_end,
                            BlockChange *found) {
@@ -134,18 +140,17 @@ ISO_INLINE int march_block(const FrameParams *frame, const CacheReader *cache, c
   if ((have & 1u) == 0) return ISO_RAY_WAITS;
   stamp_block(cache);
   const GridWalk block = walk_from(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
-  const int ends = may_end && ends_band(frame, walk_exit(&block, ray));
-  if (cells == 0 && !has_side(side) && !ends) return ISO_RAY_LEFT;
-  const RayEvent enter =
-      band_entry(frame, region_entry(ray, (int)b.x, (int)b.y, (int)b.z, 4, last));
+  const int ends = may_end && ends_ray(ray, walk_exit(&block, ray));
+  if (cells == 0 && !has_side(side) && !tells_side(ends)) return ISO_RAY_LEFT;
+  const RayEvent enter = ray_entry(ray, region_entry(ray, (int)b.x, (int)b.y, (int)b.z, 4, last));
   const GridWalk *cell = &found->at.cell;
   found->at = enter_cells(ray, b, enter, last);
   found->at_border = 0;
   do {
     const int x = cell->x & 3, y = cell->y & 3, z = cell->z & 3;
-    const int ends_here = ends && ends_band(frame, found->at.exit);
-    const RayEvent exit = ends_here ? band_end(frame) : found->at.exit;
-    if ((cells >> cell_in_block(cell) & 1ul) != 0 || has_side(side) || ends_here) {
+    const int ends_here = ends && ends_ray(ray, found->at.exit);
+    const RayEvent exit = ends_here ? ray_end(ray) : found->at.exit;
+    if ((cells >> cell_in_block(cell) & 1ul) != 0 || has_side(side) || tells_side(ends_here)) {
       if ((cell_blocks(x, y, z) & ~have) != 0) {
         result = ISO_RAY_WAITS;
       } else {
@@ -166,22 +171,24 @@ ISO_INLINE int march_block(const FrameParams *frame, const CacheReader *cache, c
                                       found->at.enter, exit, &found->change)
                      : change_or_doubt_in_cell(solver, ray, found->w, cell->x, cell->y, cell->z,
                                                found->at.enter, exit, &found->change);
-        if (result == ISO_RAY_LEFT && ends_here)
-          result = ISO_NO_DATA && lacks_data(found->w) ? ISO_RAY_ENDS_WITHOUT_DATA
+        if (result == ISO_RAY_LEFT && tells_side(ends_here))
+          result = ISO_NO_DATA && lacks_data(found->w) ? ISO_RAY_ENDS
                    : inside_at(ray, found->w, exit, cell->x, cell->y, cell->z, 1)
                        ? ISO_RAY_ENDS_INSIDE
                        : ISO_RAY_ENDS_OUTSIDE;
       }
     }
+    if (result == ISO_RAY_LEFT && ends_here) result = ISO_RAY_ENDS;
     side = ISO_SIDE_UNKNOWN;
   } while (result == ISO_RAY_LEFT && next_cell(&found->at, ray, last));
   return result;
 }
 
-/// Does a ray with this result leave its band? gone: there is no active block left for it there.
+/// Does a ray with this result leave the band of its level? gone: there is no active block left for
+/// it there.
 ISO_INLINE int leaves_band(int result, int gone) {
   return ISO_BANDS && (gone || result == ISO_RAY_ENDS_OUTSIDE || result == ISO_RAY_ENDS_INSIDE ||
-                       result == ISO_RAY_ENDS_WITHOUT_DATA);
+                       result == ISO_RAY_ENDS);
 }
 
 /// On which side it leaves.
@@ -191,12 +198,15 @@ ISO_INLINE uint leaves_on(int result) {
                                          : ISO_SIDE_UNKNOWN;
 }
 
-ISO_INLINE HitRecord hit_of(const FrameParams *frame, const Ray *ray, const BlockChange *found) {
+ISO_INLINE HitRecord hit_of(const FrameParams *frame, const ClipParams *clip, const Ray *ray,
+                            const BlockChange *found) {
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
   const float s =
       changes_at_border(found) ? 0.0f : refine(solver, found->change.cubic, found->change.bracket);
-  return make_hit(frame, ray, found->w, found->at.cell.x, found->at.cell.y, found->at.cell.z,
-                  found->at.enter, band_exit(frame, found->at.exit), s);
+  HitRecord hit = make_hit(frame, ray, found->w, found->at.cell.x, found->at.cell.y,
+                           found->at.cell.z, found->at.enter, ray_exit(ray, found->at.exit), s);
+  if (changes_at_border(found) && begins_at_cap(clip, ray)) cap_hit(clip, ray, &hit);
+  return hit;
 }
 
 #endif

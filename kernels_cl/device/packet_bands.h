@@ -7,6 +7,7 @@
 #define ISOWAVE_PACKET_BANDS_H
 
 #include "level_borders.h"
+#include "portable/packet_clip.h"
 #include "portable/packet_walk.h"
 
 /// Macrocells whose sides a work-item knows. Neighbouring packets come to the same macrocells.
@@ -99,7 +100,7 @@ ISO_INLINE void sides_in_cells(const PacketField *field, const FrameParams *fram
 #include "portable/packet_sides.h"
 
 /// find_sides(), which must not burden those that walk.
-ISO_SELDOM Ints sides_at(const PacketScene *scene, const PacketRays *r, float t, Mask lanes) {
+ISO_SELDOM Ints sides_at(const PacketScene *scene, const PacketRays *r, Floats t, Mask lanes) {
   return find_sides(scene, r, t, lanes);
 }
 
@@ -134,16 +135,18 @@ ISO_SELDOM uint side_at_border(const PacketField *field, const FrameParams *fram
              : ISO_SIDE_OUTSIDE;
 }
 
-/// The hit of a ray at the border at which its band begins, in that cell. Returns 0 if a block is
-/// missing.
-ISO_SELDOM int hit_at_border(const PacketField *field, const FrameParams *frame, const Ray *ray,
-                             BlockCoords cell, global HitRecord *hit) {
+/// The hit of a ray where it begins, in that cell. Returns 0 if a block is missing.
+ISO_SELDOM int hit_at_border(const PacketField *field, const FrameParams *frame,
+                             const ClipParams *clip, const Ray *ray, BlockCoords cell,
+                             global HitRecord *hit) {
   const int x = (int)cell.x, y = (int)cell.y, z = (int)cell.z;
   const GridWalk walk = walk_from(ray, x, y, z, 1, last_planes(frame));
   float w[8];
   if (!open_cell(field, frame, cell, w)) return 0;
-  *hit = make_hit(frame, ray, w, x, y, z, band_begin(frame),
-                  band_exit(frame, walk_exit(&walk, ray)), 0.0f);
+  HitRecord found =
+      make_hit(frame, ray, w, x, y, z, ray_begin(ray), ray_exit(ray, walk_exit(&walk, ray)), 0.0f);
+  if (begins_at_cap(clip, ray)) cap_hit(clip, ray, &found);
+  *hit = found;
   return 1;
 }
 
@@ -155,21 +158,21 @@ ISO_INLINE void wait_in_cell(const FrameParams *frame, BlockCoords cell, uint si
   rays->waiting[atomic_inc(rays->num_waiting)] = pack_entry(pixel, log_ahead, 0);
 }
 
-/// Lanes that may hit at the border at which their band begins, since they were on another side
-/// before, do so, or wait for a block there. Returns those that go on.
-ISO_SELDOM Mask cross_border(const PacketScene *scene, const PacketRays *r, Ints ray_ids,
-                             Ints before, Mask lanes, LaunchRays *rays) {
+/// Lanes that may hit where they begin, since they were on another side before, do so, or wait for
+/// a block there. Returns those that go on.
+ISO_SELDOM Mask cross_border(const PacketScene *scene, const ClipParams *clip, const PacketRays *r,
+                             Ints ray_ids, Ints before, Mask lanes, LaunchRays *rays) {
   const FrameParams *frame = scene->frame;
   Mask on = ints(0);
   ISO_EACH_LANE(lane, lanes) {
     const Ray ray = ray_of_lane(r, (int)lane);
     const uint pixel = (uint)ray_ids[lane], from = (uint)before[lane];
     BlockCoords cell = {0, 0, 0};
-    const uint side = side_at_border(scene->field, frame, &ray, r->begin_t, &cell);
+    const uint side = side_at_border(scene->field, frame, &ray, ray.begin_t, &cell);
     if (side == ISO_SIDE_UNKNOWN || side == from) {
       on[lane] = -1;
     } else if (side != ISO_SIDE_NOT_CERTAIN &&
-               hit_at_border(scene->field, frame, &ray, cell, &rays->hits[pixel])) {
+               hit_at_border(scene->field, frame, clip, &ray, cell, &rays->hits[pixel])) {
       ++rays->num_hits;
       rays->ray_block_ids[pixel] = 0;
     } else {
@@ -187,7 +190,7 @@ ISO_SELDOM Ints sides_of_each(const PacketScene *scene, const PacketRays *r, Int
   ISO_EACH_LANE(lane, lanes) {
     const Ray ray = ray_of_lane(r, (int)lane);
     BlockCoords cell = {0, 0, 0};
-    found[lane] = (int)side_at_border(scene->field, scene->frame, &ray, r->end_t, &cell);
+    found[lane] = (int)side_at_border(scene->field, scene->frame, &ray, ray.end_t, &cell);
     if (found[lane] == (int)ISO_SIDE_NOT_CERTAIN)
       wait_in_cell(scene->frame, cell, ISO_SIDE_UNKNOWN, ISO_FIRST_LOG_AHEAD, (uint)ray_ids[lane],
                    rays);

@@ -2,13 +2,27 @@
 #ifndef ISOWAVE_RAY_SOURCE_H
 #define ISOWAVE_RAY_SOURCE_H
 
-#include "portable/grid_dda.h"
+#include "portable/clip.h"
 
-/// The ray with this number, in the index space of the frame's level.
+/// The ray of the camera with this number, in the index space of the frame's level, with its
+/// interval there.
+ISO_INLINE Ray camera_ray(const FrameParams *frame, const ClipParams *clip, uint pixel) {
+  Ray ray = make_ray(frame, pixel);
+  (void)clip;
+#if ISO_CLIP
+  clip_ray(frame, clip, pixel, &ray);
+#endif
+  return ray;
+}
+
+/// The ray with this number.
 ///
 /// given  [pixel] the list; not read if ISO_GIVEN_RAYS is 0
-ISO_INLINE Ray ray_of(const FrameParams *frame, global const GivenRay *given, uint pixel) {
+/// clip   only read if ISO_CLIP is 1
+ISO_INLINE Ray ray_of(const FrameParams *frame, const ClipParams *clip,
+                      global const GivenRay *given, uint pixel) {
 #if ISO_GIVEN_RAYS
+  (void)clip;
   Ray ray = make_given_ray(given[pixel]);
   ray.x.origin = frame->brick.origin_x;
   ray.y.origin = frame->brick.origin_y;
@@ -16,7 +30,7 @@ ISO_INLINE Ray ray_of(const FrameParams *frame, global const GivenRay *given, ui
   return ray;
 #else
   (void)given;
-  return make_ray(frame, pixel);
+  return camera_ray(frame, clip, pixel);
 #endif
 }
 

@@ -9,6 +9,7 @@
 #define ISOWAVE_CLIP_H
 
 #include "grid_dda.h"
+#include "ray_state.h"
 
 ISO_NAMESPACE_BEGIN
 
@@ -50,6 +51,11 @@ ISO_INLINE int has_interval(const Ray *ray) {
 /// Does a ray that begins inside the surface hit there?
 ISO_INLINE int begins_at_cap(const ClipParams *clip, const Ray *ray) {
   return ISO_CLIP && ray->cut_by != ISO_NOT_CUT && clip->with_caps != 0;
+}
+
+/// The side on which a ray that begins at a clipping plane was before (ISO_SIDE_*).
+ISO_INLINE uint side_where_cut(const ClipParams *clip, const Ray *ray) {
+  return begins_at_cap(clip, ray) ? ISO_SIDE_OUTSIDE : ISO_SIDE_UNKNOWN;
 }
 
 /// Makes a hit where a clipped ray begins one of a cap.

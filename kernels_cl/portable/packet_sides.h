@@ -19,9 +19,9 @@ ISO_PACKET_NAMESPACE_BEGIN
 /// Lanes that leave before t, by float32 without doubt, the domains of this level and of the
 /// num_coarser next ones. A level's domain ends at most one voxel of the level before it behind the
 /// domain of that level (coarser_level() of core/volume/pyramid.hpp).
-ISO_INLINE Mask have_left(const PacketScene *scene, const PacketRays *rays, float t,
+ISO_INLINE Mask have_left(const PacketScene *scene, const PacketRays *rays, Floats t,
                           uint num_coarser) {
-  const float before = t - 2.0f * ISO_FLOAT_DOUBT * t;
+  const Floats before = t - 2.0f * ISO_FLOAT_DOUBT * t;
   Mask left = ints(0);
   ISO_EACH_OF_3(axis) {
     const PacketAxis *a = &rays->axis[axis];

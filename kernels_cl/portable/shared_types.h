@@ -108,8 +108,9 @@ inline uint popcount(uint x) {
 #define ISO_CLIP 1
 #endif
 #endif
-#define ISO_INTERVALS (ISO_BANDS || ISO_CLIP) /* rays begin and end elsewhere than at 0, INFINITY \
-                                               */
+#define ISO_INTERVALS                                                         \
+  (ISO_BANDS || ISO_CLIP) /* rays begin and end elsewhere than at 0, INFINITY \
+                           */
 
 /// The voxels of a volume, or of one of its levels of detail, and the blocks that hold them.
 typedef struct BlockGrid {
