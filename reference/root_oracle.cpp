@@ -21,7 +21,7 @@ using Interval = boost::numeric::interval<double>;
 struct Crossing {
   double plane = 0, origin = 0, direction = 1;
   double t = kInfinity;  ///< rounded
-  int axis = 3;          ///< 3: the start of the ray, t = 0
+  int axis = 3;          ///< 3: the start of the ray, whose t is `plane`
 
   mpq_class exact() const { return (mpq_class(plane) - mpq_class(origin)) / mpq_class(direction); }
   Interval interval() const { return (Interval(plane) - Interval(origin)) / Interval(direction); }
@@ -232,6 +232,10 @@ Answer change_in_cell(const std::array<double, 8> &v, double isovalue, const Ora
   return first_change(bernstein(along_segment(v, isovalue, p, e)), 0.0, 1.0, 0, max_depth);
 }
 
+bool lacks_data(const std::array<double, 8> &corners) {
+  return std::ranges::any_of(corners, [](double value) { return std::isnan(value); });
+}
+
 }  // namespace
 
 RootOracle::RootOracle(std::span<const float> voxels, std::array<std::uint32_t, 3> dims,
@@ -254,7 +258,23 @@ std::array<double, 8> RootOracle::corners(const std::array<int, 3> &cell) const 
   return v;
 }
 
-OracleHit RootOracle::first_hit(const OracleRay &ray) const {
+std::optional<bool> RootOracle::inside(const OracleRay &ray, double t) const {
+  std::array<int, 3> cell;
+  std::array<mpq_class, 3> p;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const int last_cell = static_cast<int>(dims_[axis]) - 2;
+    p[axis] = mpq_class(ray.origin[axis]) + mpq_class(t) * mpq_class(ray.direction[axis]);
+    p[axis] = std::clamp(p[axis], mpq_class(0), mpq_class(last_cell + 1));
+    cell[axis] = std::min(static_cast<int>(mpz_class(p[axis]).get_si()), last_cell);
+    p[axis] -= cell[axis];
+  }
+  const std::array<double, 8> v = corners(cell);
+  if (lacks_data(v)) return std::nullopt;
+  const std::array<mpq_class, 3> nowhere{0, 0, 0};
+  return side(along_segment<mpq_class>(v, isovalue_, p, nowhere)[0]) == Side::kInside;
+}
+
+OracleHit RootOracle::first_hit(const OracleRay &ray, double begin) const {
   const auto crossing = [&](std::size_t axis, int plane) {
     Crossing c;
     c.plane = plane;
@@ -265,7 +285,7 @@ OracleHit RootOracle::first_hit(const OracleRay &ray) const {
     return c;
   };
   Crossing enter, exit;
-  enter.t = 0;
+  enter.plane = enter.t = begin;
   std::array<int, 3> cell{}, step{};
   for (std::size_t axis = 0; axis < 3; ++axis) {  // clip to the domain
     const int last = static_cast<int>(dims_[axis]) - 1;
@@ -310,7 +330,7 @@ OracleHit RootOracle::first_hit(const OracleRay &ray) const {
     const bool inside = v[0] >= isovalue_;
     const bool mixed =
         std::any_of(v.begin() + 1, v.end(), [&](double x) { return (x >= isovalue_) != inside; });
-    if (mixed && compare(enter, leave) < 0) {
+    if (mixed && !lacks_data(v) && compare(enter, leave) < 0) {
       Answer answer = change_in_cell<Interval>(v, isovalue_, ray, cell, enter.interval(),
                                                leave.interval(), kMaxIntervalDepth);
       if (answer.kind == Answer::kUndecided) {

@@ -19,10 +19,16 @@ namespace isowave::core {
 
 class RootOracle final : public HitOracle {
  public:
-  /// voxels [nz][ny][nx], x fastest, finite; they must outlive the oracle. dims >= 2.
+  /// voxels [nz][ny][nx], x fastest, finite or NaN: without data; they must outlive the oracle. A
+  /// cell with a corner without data has no hit. dims >= 2.
   RootOracle(std::span<const float> voxels, std::array<std::uint32_t, 3> dims, float isovalue);
 
-  OracleHit first_hit(const OracleRay &ray) const override;
+  OracleHit first_hit(const OracleRay &ray) const override { return first_hit(ray, 0); }
+  /// The same of the part of the ray from t = begin on, begin >= 0.
+  OracleHit first_hit(const OracleRay &ray, double begin) const;
+  /// Whether the ray's point at t is inside, decided exactly. None: its cell lacks data. A point
+  /// beside the domain counts as the domain's nearest one.
+  std::optional<bool> inside(const OracleRay &ray, double t) const;
   double field(const std::array<double, 3> &point) const override;
   std::array<double, 3> gradient(const std::array<double, 3> &point) const override;
 
