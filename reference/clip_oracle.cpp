@@ -24,8 +24,8 @@ constexpr double kNoDirection = 0x1p-40;
 constexpr double kSamePlace = 1e-4;
 /// Rounding of the field at a place of float32, in parts of the largest difference to the isovalue.
 constexpr double kSameValue = 0x1p-19;
-/// See judge().
-constexpr double kSideways = 1e-5;
+/// Distance of rays beside one; of rays from 3,000 voxels away, which float32 moves further.
+constexpr double kSideways = 1e-5, kSidewaysFromAfar = 5e-5;
 
 /// Shortens the part to where a + b t >= 0.
 void cut(RayPart &part, double a, double b) {
@@ -266,11 +266,15 @@ Fault fault_of(const ClipOracle &oracle, std::span<const OracleRay> rays, const 
 /// Does the oracle give another answer for a ray beside this one, or the renderer's?
 bool is_unstable(const ClipOracle &oracle, std::span<const OracleRay> rays, const ClipTruth &truth,
                  const PlacedHit &got) {
+  const BlockGrid &grid = oracle.frames()[0].grid;
+  const glm::dvec3 middle = 0.5 * glm::dvec3(grid.dims_x, grid.dims_y, grid.dims_z);
+  const double offset =
+      glm::length(vec(rays[0].origin) - middle) < 3000 ? kSideways : kSidewaysFromAfar;
   for (int direction = 0; direction < 8; ++direction) {
     std::vector<OracleRay> beside;
     for (std::size_t level = 0; level < rays.size(); ++level) {
       const double voxel = oracle.frames()[level].view.t_scale / oracle.frames()[0].view.t_scale;
-      beside.push_back(moved_sideways(rays[level], kSideways / voxel, direction));
+      beside.push_back(moved_sideways(rays[level], offset / voxel, direction));
     }
     const ClipTruth moved = oracle.first_hit(beside);
     const double speed = speed_of(rays[moved.level]) / oracle.frames()[moved.level].view.t_scale;
