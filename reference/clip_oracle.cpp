@@ -310,6 +310,15 @@ void judge(const ClipOracle &oracle, std::uint32_t pixel, const HitRecord &recor
 
 }  // namespace
 
+void merge(ClipAccuracy &into, const ClipAccuracy &from) {
+  for (const auto count :
+       {&ClipAccuracy::rays, &ClipAccuracy::hits, &ClipAccuracy::caps, &ClipAccuracy::missed,
+        &ClipAccuracy::false_hits, &ClipAccuracy::wrong_kinds, &ClipAccuracy::wrong_places,
+        &ClipAccuracy::wrong_gradients, &ClipAccuracy::undecided})
+    into.*count += from.*count;
+  into.failed.insert(into.failed.end(), from.failed.begin(), from.failed.end());
+}
+
 ClipAccuracy judge_clipped(const ClipOracle &oracle, std::span<const HitRecord> hits) {
   const View &view = oracle.frames()[0].view;
   if (hits.size() != std::size_t{view.width} * view.height)
@@ -322,14 +331,7 @@ ClipAccuracy judge_clipped(const ClipOracle &oracle, std::span<const HitRecord> 
     }
   });
   ClipAccuracy sum;
-  for (const ClipAccuracy &tally : tallies) {
-    for (const auto count :
-         {&ClipAccuracy::rays, &ClipAccuracy::hits, &ClipAccuracy::caps, &ClipAccuracy::missed,
-          &ClipAccuracy::false_hits, &ClipAccuracy::wrong_kinds, &ClipAccuracy::wrong_places,
-          &ClipAccuracy::wrong_gradients, &ClipAccuracy::undecided})
-      sum.*count += tally.*count;
-    sum.failed.insert(sum.failed.end(), tally.failed.begin(), tally.failed.end());
-  }
+  for (const ClipAccuracy &tally : tallies) merge(sum, tally);
   std::ranges::sort(sum.failed);
   return sum;
 }

@@ -89,6 +89,8 @@ struct ClipAccuracy {
     return missed + false_hits + wrong_kinds + wrong_places + wrong_gradients;
   }
 };
+/// Adds the tally of other rays.
+void merge(ClipAccuracy &into, const ClipAccuracy &from);
 
 /// Judges a whole frame with as many threads as there are cores.
 ///
