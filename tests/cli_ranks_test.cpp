@@ -184,6 +184,14 @@ TEST_F(CliRanks, SamplesLevelsAndBricksAsAskedFor) {
   expect_same("generate:mixing_layer_30x40x24_uint8", "-i 128 --size 64x48 --cache-slots 64", 2);
 }
 
+/// A plane through the middle of the whole, not of a brick; a cap that belongs to several bricks.
+TEST_F(CliRanks, ClippingPlanes) {
+  expect_same(convert("--exact"), "-i 40 --size 64x48 --clip 1,1,-0.5 --ambient 2", 3);
+  expect_same(convert("--exact --levels 3"),
+              "-i 20 --size 96x64 --voxel-pixels 1.5 --clip-box 20,,,,,18 --no-caps", 3,
+              " --bricks 3x1x1");
+}
+
 TEST_F(CliRanks, AmbientRays) {
   expect_same(convert("--exact --levels 3"),
               "-i 40 --size 48x32 --voxel-pixels 1.5 --ambient 3 --samples 2", 3);

@@ -211,6 +211,8 @@ isowave::FrameRequest FrameOfMany::request() const {
   request.isovalue = isovalue;
   request.size = {size.width, size.height, size.samples};
   request.appearance = drawing.appearance;
+  request.clip = options.clip_planes;
+  request.caps = !options.clip.no_caps;
   // A volume too small for coarser levels is drawn by its finest.
   const bool has_one_level = drawing.on_host() && drawing.whole.coarser_levels.empty();
   request.voxel_pixels = has_one_level ? 0 : options.voxel_pixels;
@@ -417,6 +419,7 @@ void set_up(const CLI::App &command, RenderArgs &options, Drawing &drawing) {
   }
   together(drawing.team, [&] {
     outputs.make_folder();
+    options.clip_planes = read_clip(options.clip, drawing.info());
     make_renderer(options, drawing);
   });
   if (compiling) compiling->finish();

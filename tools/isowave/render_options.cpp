@@ -121,6 +121,13 @@ void check_options(const CLI::App &command, const RenderArgs &options, const Tea
   check_ambient_rays(options.ambient_rays);
   with_fewer_planes({}, options.frame.voxel_error);  // or throws
   check_voxel_pixels(options.voxel_pixels);
+  read_clip(options.clip, {});  // or throws
+  if (options.renderer_flags.pipeline == "blocks")
+    refuse_options(command, {"--clip", "--clip-box"}, "--pipeline blocks draws whole volumes");
+  if (draws_bounds(options)) {
+    refuse_options(command, {"--clip", "--clip-box"},
+                   "--max-surface-error is proven of whole surfaces: give --by sample");
+  }
   check_choice(options);
 }
 
@@ -178,6 +185,7 @@ void group_render_options(CLI::App &command) {
   group_options(command, "Options of every day",
                 {"--help", "--isovalue", "--output", "--size", "--samples", "--orbit", "--cameras",
                  "--parallel", "--color", "--background", "--normals", "--ambient", "--device"});
+  group_options(command, "Clipping", {"--clip", "--clip-box", "--no-caps"});
   group_volume_options(command);
   group_compression_options(command);
   group_options(command, "Precision and time",
@@ -225,6 +233,7 @@ void add_render_options(CLI::App &command, RenderArgs &options) {
       ->capture_default_str();
   add_normals_option(command, options.normals);
   add_ambient_option(command, options.ambient_rays);
+  add_clip_options(command, options.clip);
   command.add_option("--output,-o", options.image,
                      "PNG of the picture; NAME_isoV_viewK.png if there are several frames "
                      "[VOLUME_isoV.png in the current folder, if no other output is asked for]");

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/base/team.hpp"
+#include "tools/isowave/clip_options.hpp"
 #include "tools/isowave/frame_options.hpp"
 #include "tools/isowave/outputs.hpp"
 #include "tools/isowave/renderer_options.hpp"
@@ -21,6 +22,8 @@ struct RenderArgs {
   std::string input;
   VolumeOptions volume;
   FrameOptions frame;
+  ClipOptions clip;
+  std::vector<isowave::ClipPlane> clip_planes;  ///< what `clip` asks for
   std::string device;
   RendererFlags renderer_flags;
   RendererOptions renderer;  ///< what the flags ask for

@@ -28,6 +28,13 @@ nlohmann::ordered_json tries_json(const DetailChoice &choice, const char *share)
   return tries;
 }
 
+nlohmann::ordered_json clip_json(const RenderArgs &options) {
+  nlohmann::ordered_json planes = nlohmann::ordered_json::array();
+  for (const isowave::ClipPlane &plane : options.clip_planes)
+    planes.push_back({{"normal", plane.normal}, {"offset", plane.offset}});
+  return {{"planes", planes}, {"caps", !options.clip.no_caps}};
+}
+
 /// The source of the errors of a volume's voxels and levels, on which bounds rest.
 std::string_view errors_of(const CompressedVolume &volume) {
   return volume.errors_are_stated ? "stated" : "measured";
@@ -156,6 +163,7 @@ nlohmann::ordered_json options_json(const RenderArgs &options, ImageSize size,
   json["voxel_pixels"] = options.voxel_pixels;
   json["normals"] = options.normals;
   json["ambient"] = options.ambient_rays;
+  json["clip"] = clip_json(options);
   return json;
 }
 
