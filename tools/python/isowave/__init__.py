@@ -17,6 +17,7 @@ _loader.prepare()
 
 from isowave._bricks import BrickRenderer  # noqa: E402
 from isowave._camera import Camera  # noqa: E402
+from isowave._clip import ClipPlane, clip_box  # noqa: E402
 from isowave._compress import compress, open  # noqa: E402
 from isowave._core import Error, __version__  # noqa: E402
 from isowave._image import Image  # noqa: E402
@@ -30,6 +31,7 @@ from isowave.viewer import view  # noqa: E402
 __all__ = [
     "BrickRenderer",
     "Camera",
+    "ClipPlane",
     "Error",
     "Image",
     "Level",
@@ -38,6 +40,7 @@ __all__ = [
     "Report",
     "Volume",
     "__version__",
+    "clip_box",
     "compress",
     "devices",
     "open",

@@ -26,6 +26,7 @@ class _Grid(Protocol):
         ...
 
 
+Vector = tuple[float, float, float]
 Core = TypeVar("Core", bound=_Grid)
 
 
@@ -57,3 +58,13 @@ class Placed(Generic[Core]):
         """3 x 3; column a: unit world direction (x, y, z) of index axis a, in the order x, y, z."""
         columns: npt.NDArray[np.float64] = np.asarray(self._core.direction, dtype=np.float64)
         return np.ascontiguousarray(columns.T)
+
+    @property
+    def box(self) -> tuple[Vector, Vector]:
+        """Corners (x, y, z) of the least box around the volume with edges along the world's axes:
+        clip_box(*volume.box) cuts nothing."""
+        edges = self.direction * self.spacing[::-1] * (np.array(self.shape[::-1]) - 1)
+        origin = np.array(self.origin[::-1])
+        x0, y0, z0 = (float(v) for v in origin + np.minimum(edges, 0).sum(axis=1))
+        x1, y1, z1 = (float(v) for v in origin + np.maximum(edges, 0).sum(axis=1))
+        return (x0, y0, z0), (x1, y1, z1)

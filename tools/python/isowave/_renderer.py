@@ -17,6 +17,7 @@ import numpy.typing as npt
 from isowave import _core
 from isowave._camera import Camera
 from isowave._checked import Isovalue, flag, refuse, size_of, whole
+from isowave._clip import ClipPlane
 from isowave._image import Image
 from isowave._levels import Voxels
 from isowave._request import ALL_OUTPUTS, Color, Progress, Request, normals_of
@@ -191,6 +192,8 @@ class Renderer:
         color: Color | None = None,
         background: Color | None = None,
         normals: str = "smooth",
+        clip: Sequence[ClipPlane] = (),
+        caps: bool = True,
         outputs: Sequence[str] = ALL_OUTPUTS,
         max_error: float | None = None,
         by: str = "proof",
@@ -218,6 +221,12 @@ class Renderer:
             Colours of the surface and behind it: "#rrggbb", or red, green, blue from 0 to 1.
         normals
             "smooth": central differences; "cell": gradients of cells, which jump between them.
+        clip
+            Up to 14 clipping planes, see ClipPlane and clip_box(): what is in all of their half
+            spaces is drawn. A `max_error` by proof and the output "bounds" need whole surfaces.
+        caps
+            Draws flat caps where planes cut what is inside the surface. Otherwise cuts are open,
+            and show the surface from within.
         outputs
             Names of the arrays to bring back: "rgb", "depth", "normals", "position", "bounds".
         max_error

@@ -12,7 +12,8 @@ import numpy.typing as npt
 
 from isowave import _core
 from isowave._camera import Camera, vector
-from isowave._checked import function, names, number, numbers, refuse, size_of, whole
+from isowave._checked import flag, function, names, number, numbers, refuse, size_of, whole
+from isowave._clip import ClipPlane, clip_of
 
 Color = str | Sequence[float]  # "#rrggbb", or red, green, blue from 0 to 1
 ALL_OUTPUTS = ("rgb", "depth", "normals", "position")
@@ -58,6 +59,8 @@ class Request:
     color: Color | None = None
     background: Color | None = None
     normals: str = "smooth"
+    clip: Sequence[ClipPlane] = ()
+    caps: bool = True
     outputs: Sequence[str] = ALL_OUTPUTS
     max_error: float | None = None
     by: str = "proof"
@@ -82,6 +85,8 @@ class Request:
             "color": None if self.color is None else color_of(self.color),
             "background": None if self.background is None else color_of(self.background),
             "normals": normals_of(self.normals),
+            "clip": clip_of(self.clip),
+            "caps": flag("caps", self.caps),
             "outputs": outputs,
             "max_error": optional("max_error", self.max_error),
             "by": evidence_of(self.by),
@@ -123,6 +128,8 @@ class Request:
             "surface": self.color,
             "background": self.background,
             "normals": self.normals,
+            "clip": [{"normal": plane.normal, "offset": plane.offset} for plane in self.clip],
+            "caps": self.caps,
             "voxel_pixels": self.voxel_pixels,
             "voxel_error": self.voxel_error,
             "max_surface_error": self.max_error,

@@ -20,6 +20,7 @@ from __future__ import annotations
 import math
 import warnings
 import weakref
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -33,6 +34,7 @@ from vtkmodules.vtkRenderingCore import vtkPolyDataMapper, vtkTexture
 
 from isowave._camera import Camera, vector
 from isowave._checked import Isovalue
+from isowave._clip import ClipPlane
 from isowave._image import Image
 from isowave._request import Color, Request
 from isowave._volume import Volume
@@ -87,6 +89,7 @@ class Isosurface:
         self.volume = volume
         self.isovalue = request.isovalue  #: value of the field on the surface
         self.color = request.color
+        self.clip: Sequence[ClipPlane] = request.clip  #: see Renderer.render
         self.image: Image | None = None  #: the last picture, with "rgb" and "depth"
         self.error: Exception | None = None  #: why the last frame was drawn without the surface
         self._failure: Exception | None = None  # the same, of any frame since screenshot() began
@@ -129,7 +132,7 @@ class Isosurface:
             view = view_of(renderer)
             if not self.actor.GetIsIdentity():
                 raise ValueError("isosurfaces cannot be scaled or moved with the scene")
-            wanted = (self.isovalue, self.color, view)
+            wanted = (self.isovalue, self.color, tuple(self.clip), view)
             if wanted != self._drawn:
                 request = replace(
                     self._request,
@@ -137,6 +140,7 @@ class Isosurface:
                     camera=view.camera,
                     size=view.size,
                     color=self.color,
+                    clip=self.clip,
                 )
                 self.image = self.volume.draw(request, **self._renderer_options)
                 (left, bottom), (width, height) = view.corner, view.part
@@ -175,6 +179,8 @@ def add_isosurface(
     by: str = "proof",
     voxel_pixels: float = 0.0,
     normals: str = "smooth",
+    clip: Sequence[ClipPlane] = (),
+    caps: bool = True,
     memory_budget: int | None = None,
     reset_camera: bool | None = None,
 ) -> Isosurface:
@@ -198,15 +204,15 @@ def add_isosurface(
         "#rrggbb", or red, green, blue from 0 to 1.
     device, memory_budget
         As for Volume.render.
-    max_error, by, voxel_pixels, normals
-        As for Renderer.render.
+    max_error, by, voxel_pixels, normals, clip, caps
+        As for Renderer.render. PyVista's planes are ClipPlane.through(origin, normal).
     reset_camera
         Whether to set the camera so that all of the scene is seen; None: unless it was set.
 
     Returns
     -------
     Isosurface
-        Changes isovalue and colour, and removes the surface.
+        Changes isovalue, colour and clipping planes, and removes the surface.
 
     If the scene cannot be drawn with the surface, there is a warning, and screenshot() raises
     ValueError.
@@ -215,6 +221,8 @@ def add_isosurface(
         volume._isovalue(isovalue),
         color=color,
         normals=normals,
+        clip=clip,
+        caps=caps,
         outputs=("rgb", "depth"),
         max_error=max_error,
         by=by,

@@ -277,6 +277,19 @@ def test_handle(plotter, volume):
     assert len(plotter.renderer.actors) == 1
 
 
+def test_clipping_planes_may_move(plotter, volume):
+    """The front half of the surface hides a ball within, until a plane takes it away."""
+    add_ball(plotter, (0, 0, 0), radius=0.5)
+    surface = adapter.add_isosurface(plotter, volume, RADIUS, color=GREY, caps=False)
+    middle = (SIZE[1] // 2, SIZE[0] // 2)
+    assert is_grey(adapter.screenshot(plotter)[middle])
+    surface.clip = [isowave.ClipPlane.through((0, 0, 0.6), (0, 0, -1))]
+    rgb = adapter.screenshot(plotter)
+    assert is_red(rgb[middle]) and is_grey(rgb[pixel_of(plotter, (0.7, 0, 0.6))])
+    surface.clip[0] = isowave.ClipPlane.through((0, 0, 0), (0, 0, 1))
+    assert is_grey(adapter.screenshot(plotter)[middle])
+
+
 def test_scene_knows_the_volume(volume):
     """Its box is among the scene's bounds, so that a plotter's first camera sees it."""
     plotter = pyvista.Plotter(off_screen=True, window_size=SIZE)

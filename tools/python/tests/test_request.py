@@ -12,6 +12,7 @@ import pytest
 import isowave
 from isowave._request import Request
 
+PLANE = "ClipPlane(normal=(1, 0, 0), offset=0.0)"
 CAMERA = isowave.Camera((0, 0, 5), (0, 0, 0), (0, 1, 0), 45)
 
 
@@ -38,6 +39,8 @@ def test_arguments_reach_the_request_by_their_names(monkeypatch: pytest.MonkeyPa
         "color": (1.0, 0.5, 0.0),
         "background": (0.0, 0.5, 1.0),
         "normals": "cell",
+        "clip": (isowave.ClipPlane((0.0, 0.0, 2.0), 3.0),),
+        "caps": False,
         "outputs": ("rgb", "bounds"),
         "max_error": 1.0,
         "by": "sample",
@@ -67,6 +70,8 @@ def test_arguments_reach_the_request_by_their_names(monkeypatch: pytest.MonkeyPa
         "surface": (1, 0.5, 0),
         "background": (0, 0.5, 1),
         "normals": "cell",
+        "clip": [{"normal": (0, 0, 2), "offset": 3}],
+        "caps": False,
         "voxel_pixels": 2,
         "voxel_error": 3,
         "max_surface_error": 1,
@@ -97,13 +102,20 @@ def test_values_are_python_s_own() -> None:
         isowave.Camera(np.array((0, 0, 5)), [0, 0, 0]),  # type: ignore[arg-type]
         np.array((64, 48)),
         color="#ff8000",
+        clip=[isowave.ClipPlane(np.array((1, 0, 0)), np.int8(2))],  # type: ignore[arg-type]
         ambient=np.uint8(3),
     )
     assert request == Request(
-        80.0, isowave.Camera((0, 0, 5), (0, 0, 0)), (64, 48), color=(1, 128 / 255, 0), ambient=3
+        80.0,
+        isowave.Camera((0, 0, 5), (0, 0, 0)),
+        (64, 48),
+        color=(1, 128 / 255, 0),
+        clip=(isowave.ClipPlane((1, 0, 0), 2),),
+        ambient=3,
     )
     assert type(request.isovalue) is float and type(request.ambient) is int
     assert request.camera is not None and type(request.camera.eye) is tuple
+    assert type(request.clip[0].normal) is tuple and type(request.clip[0].offset) is float
 
 
 @pytest.mark.parametrize(
@@ -119,6 +131,10 @@ def test_values_are_python_s_own() -> None:
         ("color", "red", "color 'red': give '#rrggbb', or red, green, blue from 0 to 1"),
         ("background", (1, 2, 3), "color (1.0, 2.0, 3.0): give red, green and blue, from 0 to 1"),
         ("normals", "flat", "normals 'flat': give 'smooth' or 'cell'"),
+        ("clip", isowave.ClipPlane((1, 0, 0)), f"clip={PLANE}: give a list of clipping planes"),
+        ("clip", [(1, 0, 0)], "clip=(1, 0, 0): give an isowave.ClipPlane"),
+        ("clip", [isowave.ClipPlane((1, 0))], "ClipPlane.normal=(1, 0): give 3 numbers"),
+        ("caps", 1, "caps=1: give True or False"),
         ("outputs", ("rgb", "a"), "outputs a: there are rgb, depth, normals, position, bounds"),
         ("max_error", "1", "max_error='1': give a number"),
         ("by", "luck", "by 'luck': give 'proof' or 'sample'"),
