@@ -190,8 +190,9 @@ def test_the_focus_goes_through_everything_in_order_and_is_seen(page: Any) -> No
         seen.append(at["name"])
     if FIREFOX:  # whose keys scroll it from there
         seen.remove("panel")
-    expected = "picture toggle isovalue slider reset shot copy paste color background max_error by"
-    expected += " samples ambient time_budget budget summary"
+    expected = "picture toggle isovalue slider reset shot copy paste color background"
+    expected += "".join(f" clip_{axis}_from clip_{axis}_to" for axis in "xyz")
+    expected += " caps max_error by samples ambient time_budget budget summary"
     assert seen == expected.split()
 
 

@@ -14,6 +14,7 @@ from PIL import Image
 
 import isowave
 from isowave._request import Request
+from isowave.viewer.protocol import VERSION
 from isowave.viewer.renderers import make_host
 from isowave.viewer.scene import Scene
 from isowave.viewer.session import Session
@@ -35,6 +36,8 @@ WISH: dict[str, Any] = {
     "by": "proof",
     "time_budget": None,
     "ambient": 0,
+    "clip": [],
+    "caps": True,
 }
 
 
@@ -58,7 +61,7 @@ class Front:
         self.heads = list[dict[str, Any]]()
         self.pictures = list[bytes]()
         self.session = Session(scene, self._take)
-        self.session.receive({"type": "hello", "version": 3})
+        self.session.receive({"type": "hello", "version": VERSION})
 
     def _take(self, head: dict[str, Any], data: bytes | None) -> None:
         with self.changed:

@@ -12,13 +12,23 @@ from typing import Any
 import pytest
 from viewer_fakes import FakeVolume
 
-from isowave import Camera
+from isowave import Camera, ClipPlane
 from isowave._request import Request
-from isowave.viewer.protocol import Ack, Budget, Hello, ProtocolError, Wish, check, parse
+from isowave.viewer.protocol import (
+    VERSION,
+    Ack,
+    Budget,
+    Hello,
+    ProtocolError,
+    Wish,
+    check,
+    parse,
+)
 from isowave.viewer.scene import Scene
 from isowave.viewer.session import Session
 
 CAMERA = {"eye": [0, 0, 5], "at": [0, 0, 0], "up": [0, 1, 0], "fovy_deg": 60}
+PLANE = {"normal": [1, 0, 0], "offset": 5}
 WISH: dict[str, Any] = {
     "type": "wish",
     "id": 7,
@@ -32,17 +42,21 @@ WISH: dict[str, Any] = {
     "by": "sample",
     "time_budget": None,
     "ambient": 16,
+    "clip": [{"normal": [0, 0.5, -1], "offset": -20}],
+    "caps": False,
 }
 
 
 def test_messages_are_read() -> None:
-    assert check({"type": "hello", "version": 3}) == Hello()
+    assert check({"type": "hello", "version": VERSION}) == Hello()
     assert check({"type": "ack", "frame": 3}) == Ack(3)
     assert check({"type": "budget", "bytes": None}) == Budget(None)
     assert check({"type": "budget", "bytes": 5}) == Budget(5)
     camera = Camera((0, 0, 5), (0, 0, 0), (0, 1, 0), 60)
     colors: dict[str, Any] = {"color": (1, 0.5, 0), "background": (1, 1, 1), "outputs": ("rgb",)}
-    asked = Request(80, camera, (64, 48), 2, **colors, max_error=0.5, by="sample", ambient=16)
+    clip: dict[str, Any] = {"clip": [ClipPlane((0, 0.5, -1), -20)], "caps": False}
+    more: dict[str, Any] = {"max_error": 0.5, "by": "sample", "ambient": 16}
+    asked = Request(80, camera, (64, 48), 2, **colors, **clip, **more)
     assert check(parse(json.dumps(WISH))) == Wish(7, asked)
     timed = check({**WISH, "max_error": None, "time_budget": 50})
     assert isinstance(timed, Wish) and timed.request.time_budget == 0.05  # ms to seconds
@@ -67,6 +81,14 @@ BAD_WISHES: list[tuple[dict[str, Any], str]] = [
     ({"ambient": 256}, "ambient"),
     ({"ambient": -1}, "ambient"),
     ({"ambient": 1.5}, "ambient"),
+    ({"clip": PLANE}, "clip must be a list of at most 14 planes"),
+    ({"clip": 15 * [PLANE]}, "clip must be a list of at most 14 planes"),
+    ({"clip": [[1, 0, 0]]}, "a plane of clip must have normal and offset"),
+    ({"clip": [{**PLANE, "more": 1}]}, "a plane of clip must have normal and offset"),
+    ({"clip": [{**PLANE, "normal": [0, 0, 0]}]}, "normal must be a direction"),
+    ({"clip": [{**PLANE, "normal": [2, 0, 0]}]}, "normal must be a number from -1 to 1"),
+    ({"clip": [{**PLANE, "offset": float("nan")}]}, "offset"),
+    ({"caps": 1}, "caps must be true or false"),
     ({"color": [0, 0, 1.01]}, "color"),
     ({"background": [0, 0]}, "background"),
     ({"max_error": 0}, "max_error"),
@@ -128,12 +150,12 @@ def test_texts_that_are_refused(text: str, message: str) -> None:
 
 def test_another_version_is_told_to_reload() -> None:
     with pytest.raises(ProtocolError, match="reload"):
-        check({"type": "hello", "version": 4})
+        check({"type": "hello", "version": VERSION + 1})
 
 
 VALID: list[dict[str, Any]] = [
     WISH,
-    {"type": "hello", "version": 3},
+    {"type": "hello", "version": VERSION},
     {"type": "ack", "frame": 0},
     {"type": "budget", "bytes": 1 << 30},
     {**WISH, "camera": None},
@@ -200,7 +222,7 @@ def test_fuzz() -> None:
     for i in range(count):
         if session is None:
             session = Session(scene, post, rate=1e9, burst=1e9)
-            session.receive({"type": "hello", "version": 3})
+            session.receive({"type": "hello", "version": VERSION})
         message = copy.deepcopy(chance.choice(VALID))
         for _ in range(chance.randrange(3)):
             message = mutated(message, chance) if isinstance(message, dict) else message
@@ -230,7 +252,7 @@ def test_fuzz() -> None:
     # Somebody else sees a picture.
     sent.clear()
     other = Session(scene, post)
-    other.receive({"type": "hello", "version": 3})
+    other.receive({"type": "hello", "version": VERSION})
     other.receive({**WISH, "id": 1})
     while scene.step():
         other.receive({"type": "ack", "frame": sum(h["type"] == "picture" for h in sent)})

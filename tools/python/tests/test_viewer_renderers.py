@@ -9,6 +9,7 @@ import pytest
 from viewer_fakes import FakeVolume
 from viewer_scenes import Clock, Eye, make_scene, run, wish_of
 
+from isowave import ClipPlane
 from isowave.viewer.protocol import Ack, Budget
 from isowave.viewer.renderers import GIVE_BACK_SECONDS, MAX_CAMERA_RAYS
 from isowave.viewer.scene import CERTAIN_SECONDS, REST_SECONDS, Scene
@@ -345,3 +346,21 @@ def test_a_large_renderer_stays_for_those_who_still_need_it() -> None:
     clock.now += 100
     run(scene)
     assert len(volume.renderers) == 2, "it was needed again in time"
+
+
+def test_clipped_surfaces_have_no_bounds() -> None:
+    clock, volume = Clock(), FakeVolume()
+    scene = make_scene(volume, clock)
+    eye = Eye(scene)
+    planes = (ClipPlane((1, 0, 0), 20.0),)
+    for clip in (planes, ()):
+        eye.wish(size=(64, 48), clip=clip, caps=False)
+        for _ in range(3):
+            run(scene)
+            eye.ack()
+            clock.now += 10
+        assert eye.pictures[-1] == (eye.wishes, "lossless")
+        assert len(eye.of_type("bounds")) == (0 if clip else 1) and not eye.of_type("error")
+    drawn = [frame.request for frame in volume.frames]
+    assert [(tuple(r.clip), r.caps) for r in drawn[:2]] == 2 * [(planes, False)]  # first and whole
+    assert all(r.clip == () for r in drawn[2:]) and "bounds" in drawn[-1].outputs

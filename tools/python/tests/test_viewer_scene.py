@@ -15,7 +15,7 @@ from viewer_fakes import Drawn, FakeVolume
 from viewer_scenes import Clock, Eye, make_scene, run, wish_of
 
 from isowave import Camera
-from isowave.viewer.protocol import Ack, ProtocolError, TokenBucket
+from isowave.viewer.protocol import VERSION, Ack, ProtocolError, TokenBucket
 from isowave.viewer.scene import Scene
 from isowave.viewer.session import Session
 from isowave.viewer.turns import TURN_SECONDS
@@ -533,7 +533,7 @@ def test_a_client_whose_transport_fails_is_forgotten() -> None:
 def test_there_are_at_most_so_many_clients() -> None:
     scene = make_scene(FakeVolume(), Clock(), max_clients=2)
     sessions = [Session(scene, lambda head, data: None) for _ in range(3)]
-    hello = {"type": "hello", "version": 3}
+    hello = {"type": "hello", "version": VERSION}
     sessions[0].receive(hello)
     sessions[1].receive(hello)
     with pytest.raises(ProtocolError, match="too many clients"):
@@ -547,7 +547,7 @@ def test_sessions_begin_with_hello_and_limit_the_rate() -> None:
     session = Session(scene, lambda head, data: None, rate=10, burst=3, clock=clock)
     with pytest.raises(ProtocolError, match="must be hello"):
         session.receive({"type": "ack", "frame": 0})
-    session.receive({"type": "hello", "version": 3})
+    session.receive({"type": "hello", "version": VERSION})
     session.receive({"type": "ack", "frame": 0})
     with pytest.raises(ProtocolError, match="too many messages"):
         session.receive({"type": "ack", "frame": 0})
@@ -576,10 +576,11 @@ def test_100_reconnects_leave_nothing() -> None:
 
     for i in range(100):
         session = Session(scene, post)
-        session.receive({"type": "hello", "version": 3})
+        session.receive({"type": "hello", "version": VERSION})
         wish = {"type": "wish", "id": 1, "isovalue": 80, "size": [32, 32], "camera": None}
         wish |= {"color": [1, 1, 1], "background": [0, 0, 0], "samples": 1}
         wish |= {"max_error": None, "by": "proof", "time_budget": None, "ambient": 0}
+        wish |= {"clip": [], "caps": True}
         session.receive(wish)
         if i % 10 == 0:
             assert ready.wait(60)

@@ -42,6 +42,8 @@ WISH: dict[str, Any] = {
     "by": "proof",
     "time_budget": None,
     "ambient": 0,
+    "clip": [],
+    "caps": True,
 }
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from isowave._camera import Camera
+from isowave._placed import Vector
 from isowave._request import Request
 
 SIDE = 64  # voxels along each axis, spacing 1
@@ -66,6 +67,7 @@ class FakeVolume:
     renderers: list[dict[str, Any]] = field(default_factory=list)
     shape: tuple[int, int, int] = (SIDE, SIDE, SIDE)
     spacing: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    box: tuple[Vector, Vector] = ((0.0, 0.0, 0.0), (SIDE - 1.0, SIDE - 1.0, SIDE - 1.0))
     source_dtype: np.dtype[Any] = field(default_factory=lambda: np.dtype(np.uint8))
     value_range: tuple[float, float] = (0.0, VALUES)
     nbytes: int = 65536

@@ -25,7 +25,8 @@ HELLO = json.dumps({"type": "hello", "version": VERSION})
 def wish_text(wish_id: int, isovalue: float = 80) -> str:
     wish = {"type": "wish", "id": wish_id, "isovalue": isovalue, "size": [32, 24]}
     wish |= {"camera": None, "color": [1, 1, 1], "background": [0, 0, 0], "samples": 1}
-    return json.dumps(wish | {"max_error": None, "by": "proof", "time_budget": None, "ambient": 0})
+    wish |= {"max_error": None, "by": "proof", "time_budget": None, "ambient": 0}
+    return json.dumps(wish | {"clip": [], "caps": True})
 
 
 @contextmanager

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from isowave._camera import Camera
+from isowave._placed import Vector
 from isowave._request import Request
 
 
@@ -79,6 +80,10 @@ class VolumeLike(Protocol):
 
     @property
     def spacing(self) -> tuple[float, float, float]:
+        ...
+
+    @property
+    def box(self) -> tuple[Vector, Vector]:
         ...
 
     @property

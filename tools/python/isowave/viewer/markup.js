@@ -39,6 +39,9 @@ const HTML = `
     <h2>Colour</h2>
     <label>Surface <input name="color" type="color"></label>
     <label>Background <input name="background" type="color"></label>
+    <h2>Clip</h2>${CLIP_ROWS}
+    <label title="Flat caps where the volume is cut; otherwise cuts show the surface from within">
+      Caps <input name="caps" type="checkbox"></label>
     <h2>Quality</h2>
     <label>Largest error <span class="unit"><input name="max_error" type="number"
       min="0.001" max="1000"
@@ -119,6 +122,16 @@ const CSS = `
 .panel label { display: flex; justify-content: space-between; align-items: center; gap: 8px;
   min-height: 30px; }
 .panel :is(select, input[type=color]) { flex: none; width: 76px; margin-right: 32px; }
+.clip { display: flex; align-items: center; gap: 8px; min-height: 30px; }
+.clip span { width: 1ch; }
+.clip div { position: relative; flex: 1; height: 20px; background: linear-gradient(var(--bars),
+  var(--bars)) center / calc(100% - ${THUMB}px) 2px no-repeat; }
+.clip input { position: absolute; inset: 0; width: 100%; height: 20px; margin: 0;
+  appearance: none; background: none; border-radius: 3px; pointer-events: none; }
+.clip input::-webkit-slider-thumb { appearance: none; width: ${THUMB}px; height: ${THUMB}px;
+  border-radius: 50%; background: var(--accent); cursor: ew-resize; pointer-events: auto; }
+.clip input::-moz-range-thumb { width: ${THUMB}px; height: ${THUMB}px; border: 0;
+  border-radius: 50%; background: var(--accent); cursor: ew-resize; pointer-events: auto; }
 .buttons { display: grid; grid-template-columns: 1fr 1fr; gap: 6px; }
 .paste { margin-top: 8px; }
 .paste label { display: block; }
@@ -132,6 +145,7 @@ button:hover { border-color: var(--accent); color: var(--accent); }
 .panel input[type=number] { width: 100%; text-align: right; appearance: textfield; }
 input::-webkit-inner-spin-button { display: none; }
 input::placeholder { color: var(--soft); opacity: 1; }
+.panel input[type=checkbox] { margin: 0 32px 0 0; }
 input[type=color] { height: 26px; padding: 2px; border: 1px solid var(--edge);
   border-radius: 4px; background: var(--field); cursor: pointer; }
 input:invalid { border-color: var(--bad); outline-color: var(--bad); }

@@ -26,6 +26,7 @@ def welcome(
         "title": title,
         "shape": [int(n) for n in volume.shape],
         "spacing": [float(s) for s in volume.spacing],
+        "box": [list(corner) for corner in volume.box],
         "dtype": str(volume.source_dtype),
         "range": list(value_range),
         "bits_per_voxel": float(volume.bits_per_voxel),

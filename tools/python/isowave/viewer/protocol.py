@@ -8,7 +8,8 @@ looks nowhere.
     {"type": "hello", "version": 1}
     {"type": "wish", "id": 7, "isovalue": 80, "size": [1280, 720], "camera": {...} | null,
      "color": [r, g, b], "background": [r, g, b], "samples": 1, "max_error": 0.5 | null,
-     "by": "proof" | "sample", "time_budget": 100 | null, "ambient": 0}
+     "by": "proof" | "sample", "time_budget": 100 | null, "ambient": 0,
+     "clip": [{"normal": [1, 0, 0], "offset": 20}], "caps": true}
     {"type": "ack", "frame": 3}
     {"type": "budget", "bytes": 600000000 | null}
 
@@ -26,13 +27,15 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from isowave._camera import Camera
+from isowave._clip import ClipPlane
 from isowave._request import Request
 
-VERSION: Final = 3
+VERSION: Final = 4
 MAX_MESSAGE_BYTES: Final = 8192
 MAX_SIDE: Final = 8192  # pixels of a picture along each axis
 MAX_SAMPLES: Final = 8  # rays of a pixel along each axis, as the library has it
 MAX_AMBIENT: Final = 255  # rays of a hit, as the library has it
+MAX_PLANES: Final = 14  # as the library has it
 MAX_TIME_BUDGET: Final = 10_000  # ms
 MAX_FLOAT32: Final = 3.4028234663852886e38
 MAX_LENGTH: Final = 1e18  # of a camera's coordinates [world units]
@@ -186,6 +189,27 @@ def _camera(value: object) -> Camera | None:
     return Camera(eye, at, up, fovy)
 
 
+def _plane(value: object) -> ClipPlane:
+    if not isinstance(value, dict) or value.keys() != {"normal", "offset"}:
+        raise ProtocolError("a plane of clip must have normal and offset, and nothing else")
+    normal = _triple(value["normal"], -1, 1, "normal")
+    if math.hypot(*normal) < 1e-3:
+        raise ProtocolError("normal must be a direction")
+    return ClipPlane(normal, _number(value["offset"], -MAX_LENGTH, MAX_LENGTH, "offset"))
+
+
+def _clip(value: object) -> tuple[ClipPlane, ...]:
+    if not isinstance(value, list) or len(value) > MAX_PLANES:
+        raise ProtocolError(f"clip must be a list of at most {MAX_PLANES} planes")
+    return tuple(_plane(plane) for plane in value)
+
+
+def _flag(value: object, what: str) -> bool:
+    if not isinstance(value, bool):
+        raise ProtocolError(f"{what} must be true or false")
+    return value
+
+
 def _optional(value: object, low: float, high: float, what: str) -> float | None:
     return None if value is None else _number(value, low, high, what)
 
@@ -212,6 +236,8 @@ def _read_wish(content: dict[str, Any]) -> Wish:
         samples=_integer(content["samples"], 1, MAX_SAMPLES, "samples"),
         color=_triple(content["color"], 0, 1, "color"),
         background=_triple(content["background"], 0, 1, "background"),
+        clip=_clip(content["clip"]),
+        caps=_flag(content["caps"], "caps"),
         outputs=("rgb",),
         max_error=_optional(content["max_error"], 1e-3, 1e3, "max_error"),
         by=content["by"] if content["max_error"] is not None else "proof",
@@ -235,7 +261,7 @@ _READERS: Final[dict[str, tuple[dict[str, None], Callable[[dict[str, Any]], Mess
     "wish": (
         dict.fromkeys(
             "type id isovalue size camera color background samples max_error by"
-            " time_budget ambient".split()
+            " time_budget ambient clip caps".split()
         ),
         _read_wish,
     ),

@@ -393,7 +393,9 @@ class Scene:
         with self._changed:
             if client.wish is wish:
                 now = self._clock()
-                client.stage, client.due = Stage.CERTAIN, now + CERTAIN_SECONDS
+                is_whole = not wish.request.clip  # only errors of whole surfaces are bounded
+                client.stage = Stage.CERTAIN if is_whole else Stage.DONE
+                client.due = now + CERTAIN_SECONDS
                 head = {**head, "stage": "lossless", "format": "png"}
                 client.offer(head, data, now, keep=True)
                 self._changed.notify_all()

@@ -5,10 +5,17 @@
 /** @typedef {{eye: Vec, at: Vec, up: Vec, fovy_deg: number}} Camera world space */
 /** @typedef {{isovalue: number, camera: ?Camera, color: string, background: ?string,
  *    samples: number, max_error: ?number, by: string, time_budget: ?number,
- *    ambient: number}} State
- *    what the URL keeps */
+ *    ambient: number, clip: number[], caps: boolean}} State
+ *    what the URL keeps. clip: from and to along x, y and z [% of the volume's box] */
 
 const AMBIENT = [8, 16, 32, 64]; // rays of a hit that one can choose
+
+// Colours and numbers as messages and elements have them.
+const toRgb = (hex) => [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16) / 255);
+const toText = (value) => String(Number(Number(value).toPrecision(6)));
+const toShort = (value) => String(Number(Number(value).toPrecision(3)));
+const toMiB = (bytes) => `${Math.round(bytes / 2 ** 20).toLocaleString("en")} MiB`;
+const toCount = (n) => (n === null || n === undefined ? "–" : n.toLocaleString("en"));
 
 // Vectors.
 const add = (a, b) => a.map((x, i) => x + b[i]);
@@ -119,6 +126,8 @@ export function writeHash(state) {
   if (state.max_error && state.by === "sample") parts.by = state.by;
   if (state.time_budget) parts.ms = short(state.time_budget);
   if (state.ambient) parts.ambient = state.ambient;
+  if (state.clip.some((percent, i) => percent !== WHOLE[i])) parts.clip = state.clip.join(",");
+  if (!state.caps) parts.caps = 0;
   if (camera) {
     for (const key of ["eye", "at", "up"]) parts[key] = camera[key].map(short).join(",");
     parts.fovy = short(camera.fovy_deg);
@@ -149,6 +158,8 @@ export function readHash(hash) {
     by: ["proof", "sample"].find((by) => by === parts.get("by")),
     time_budget: parts.has("error") ? undefined : number("ms", 1, 10000),
     ambient: [0, ...AMBIENT].find((n) => n === number("ambient", 0, 255)),
+    clip: [vector("clip")].find(isClip),
+    caps: number("caps", 0, 0) === 0 ? false : undefined,
   };
   if (parts.has("eye")) {
     try {

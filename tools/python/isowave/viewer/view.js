@@ -3,8 +3,8 @@
 //
 // What the front end says (protocol.py checks it): hello, wish, ack, budget. What it hears:
 //
-//   welcome    title, shape [z,y,x], spacing, dtype, range [low, high], bits_per_voxel,
-//              max_error of voxels, isovalue
+//   welcome    title, shape [z,y,x], spacing, box [[x,y,z], [x,y,z]] in world space, dtype,
+//              range [low, high], bits_per_voxel, max_error of voxels, isovalue
 //   status     state: starting, ready, failed; device ("host": none), notice (what it computes
 //              otherwise than the host, or ""), device_memory (null on the host), memory_bytes,
 //              memory_budget, nbytes of the compressed volume
@@ -28,7 +28,7 @@
  *    isDark: () => boolean}} Home where a view is. wheel: whether the wheel is the view's
  */
 
-const VERSION = 3;
+const VERSION = 4;
 const MIN_WAIT_MS = 15; // between two wishes
 const MAX_IN_WAIT_MS = 120; // for a picture of the last wish, before the next one is sent
 const MAX_PIXEL_RATIO = 2;
@@ -37,12 +37,7 @@ const PAN_STEP = 0.05; // of the picture's height
 const ZOOM_STEP = 1.15;
 const DARK = "(prefers-color-scheme: dark)";
 
-const toRgb = (hex) => [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16) / 255);
-const toText = (value) => String(Number(Number(value).toPrecision(6)));
-const toShort = (value) => String(Number(Number(value).toPrecision(3)));
-const toMiB = (bytes) => `${Math.round(bytes / 2 ** 20).toLocaleString("en")} MiB`;
 const isFresher = (a, b) => a.wish > b.wish || (a.wish === b.wish && a.frame > b.frame);
-const toCount = (n) => (n === null || n === undefined ? "–" : n.toLocaleString("en"));
 
 /** One view: its elements, its state, and what it has shown. */
 class View {
@@ -62,9 +57,10 @@ class View {
     this.find = (selector) => this.root.querySelector(selector);
     this.picture = this.find(".picture");
     this.field = (name) => this.find(`[name=${name}]`);
+    this.clips = [...this.root.querySelectorAll(".clip input")];
     /** @type {State} */
     this.state = { isovalue: NaN, camera: null, color: "#dbbd87", background: null, samples: 1,
-      max_error: null, by: "proof", time_budget: null, ambient: 0 };
+      max_error: null, by: "proof", time_budget: null, ambient: 0, clip: WHOLE, caps: true };
     if (home.hash) Object.assign(this.state, readHash(location.hash));
     this.wish = 0;
     this.shown = this.arrived = { wish: -1, frame: -1 };
@@ -291,7 +287,7 @@ class View {
     const { width, height } = this.picture.getBoundingClientRect();
     if (!(width >= 1 && height >= 1)) return; // hidden: the observer pushes when it is not
     const ratio = Math.min(devicePixelRatio, MAX_PIXEL_RATIO);
-    const { background, color, ...rest } = this.state;
+    const { background, color, clip, ...rest } = this.state;
     this.wish += 1;
     this.answered = false;
     this.sentAt = performance.now();
@@ -304,6 +300,7 @@ class View {
       size: [width, height].map((side) => clamp(Math.round(side * ratio), 1, 8192)),
       color: toRgb(color),
       background: toRgb(this.backgroundShown()),
+      clip: clipPlanes(clip, this.volume.box),
       ...rest,
     });
   }
@@ -341,13 +338,12 @@ class View {
     this.set("isovalue", value);
     this.field("slider").value = state.isovalue;
     this.field("slider").setAttribute("aria-valuetext", value);
-    this.field("color").value = state.color;
+    for (const name of ["color", "samples", "ambient", "by"]) this.field(name).value = state[name];
     this.field("background").value = this.backgroundShown();
-    this.field("samples").value = state.samples;
-    this.field("ambient").value = state.ambient;
     this.set("max_error", state.max_error ?? "");
-    this.field("by").value = state.by;
     this.set("time_budget", state.time_budget ?? "");
+    this.clips.forEach((slider, i) => { slider.value = state.clip[i]; });
+    this.field("caps").checked = state.caps;
     this.drawHistogram();
   }
 
@@ -506,6 +502,9 @@ class View {
     for (const name of ["color", "background"]) {
       on(this.field(name), "input", (e) => this.change({ [name]: e.target.value }));
     }
+    this.clips.forEach((slider, i) => on(slider, "input", () =>
+      this.change({ clip: moveClip(this.state.clip, i, Number(slider.value)) })));
+    on(this.field("caps"), "change", (e) => this.change({ caps: e.target.checked }));
     on(this.find(".budget"), "submit", (e) => this.sendBudget(e));
     on(this.field("budget"), "change", (e) => this.sendBudget(e));
     on(this.find(".toggle"), "click", () => this.setOpen(this.find(".closed") !== null));
