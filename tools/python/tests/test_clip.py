@@ -133,7 +133,7 @@ def test_planes_that_cannot_be_drawn_are_refused(ball: isowave.Volume) -> None:
 
 
 def test_the_box_around_a_volume() -> None:
-    """Of index axis x along the world's y, y along -x, and z leaning."""
+    """Index axis x is along the world's y, y along -x, and z leans."""
     direction = np.array(((0, -1, 0), (1, 0, 0.6), (0, 0, 0.8)))
     volume = isowave.compress(
         sphere_voxels((11, 7, 6)),
