@@ -156,6 +156,25 @@ TEST_P(BrickTeamOnDevice, ParallelRays) {
   }
 }
 
+/// A cap is drawn by the brick that has it, and ambient rays are clipped in all bricks.
+TEST_P(BrickTeamOnDevice, ClippedVolumes) {
+  const RendererOptions options{.size = kFrame, .with_given_rays = true};
+  request_.ambient_rays = 2;
+  const Image8 all = picture_of_one(request_, options);
+  const glm::dvec3 middle = 0.5 * glm::dvec3(volume_.info().dims - 1u);
+  const glm::dvec3 towards_eye = glm::normalize(camera_.eye - middle);
+  for (const bool caps : {true, false}) {
+    request_.clip = {{{-towards_eye, -glm::dot(towards_eye, middle)}, {{0.1, 1, 0.2}, 9}}, caps};
+    const Image8 whole = picture_of_one(request_, options);
+    EXPECT_NE(whole.pixels, all.pixels);
+    on_ranks(4, options, [&](TeamRenderer &renderer, std::uint32_t rank) {
+      renderer.render(request_);
+      const Image8 image = renderer.shade({});
+      EXPECT_TRUE(rank != 0 || image.pixels == whole.pixels);
+    });
+  }
+}
+
 std::size_t num_drawn(const Image8 &image) {
   std::size_t drawn = 0;
   for (std::size_t i = 0; i < image.pixels.size(); i += 3)

@@ -182,8 +182,8 @@ class ClippedVolume {
   void expect_frame(const ViewCase &view, const Clip &clip) {
     const FrameRequest request{.camera = view.camera,
                                .isovalue = of_.isovalue,
-                               .clip = clip,
                                .size = kSize,
+                               .clip = clip,
                                .voxel_pixels = view.voxel_pixels};
     const Levels levels(of_.volume, request);
     const ClipOracle oracle(info(), view.camera, clip, levels.frames, levels.voxels);
@@ -300,8 +300,8 @@ class ClipJudge : public testing::Test {
   VolumeCase of_ = gyroid();
   FrameRequest request_{.camera = views(of_.volume.info)[0].camera,
                         .isovalue = of_.isovalue,
-                        .clip = {clips(of_.volume.info)[2].planes},
-                        .size = kSize};
+                        .size = kSize,
+                        .clip = {clips(of_.volume.info)[2].planes}};
   Levels levels_{of_.volume, request_};
   ClipOracle oracle_{of_.volume.info, request_.camera, request_.clip, levels_.frames,
                      levels_.voxels};

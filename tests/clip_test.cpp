@@ -257,7 +257,13 @@ TEST_F(ClipRay, StartsAtTheEyeIfThatStays) {
   EXPECT_FALSE(has_interval(&behind));
 }
 
-TEST(ClipEnd, IsWhereAGivenRayLeaves) {
+/// Just before t, a given ray is within all half spaces, and just behind it is not.
+void expect_left_at(const ClipParams &params, const GivenRay &given, float voxel, float t) {
+  EXPECT_FALSE(is_clipped(&params, given, voxel, t - 0.001f)) << t;
+  EXPECT_TRUE(is_clipped(&params, given, voxel, t + 0.001f)) << t;
+}
+
+TEST(IsClipped, AGivenRayBehindAPlane) {
   VolumeInfo info = test::grid_info({20, 20, 20}, {2, 1, 1});
   info.origin = {100, 0, 0};
   const Camera camera = test::camera_along({90, 3, 3}, {1, 0, 0});
@@ -265,16 +271,16 @@ TEST(ClipEnd, IsWhereAGivenRayLeaves) {
   const ClipParams params = make_clip_params(
       info, frame.view, camera, {{{{-1, 0, 0}, -120}, {{0, -2, 0}, -16}, {{0, 0, 1}, -4}}});
   // x up to 120: voxel 10; y up to 8; z from -4 on.
-  EXPECT_EQ(clip_end(&params, {4, 2, 2, 1, 0, 0, 0}, 1), 6);
-  EXPECT_EQ(clip_end(&params, {4, 2, 2, 1, 2, 0, 0}, 1), 3);
-  EXPECT_EQ(clip_end(&params, {4, 2, 2, 0, 0, -1, 0}, 1), 6);
-  EXPECT_EQ(clip_end(&params, {4, 2, 2, -1, -1, 1, 0}, 1), INFINITY);
-  EXPECT_EQ(clip_end(&params, {4, 2, 2, 0, 0, 1, 0}, 1), INFINITY);
+  expect_left_at(params, {4, 2, 2, 1, 0, 0, 0}, 1, 6);
+  expect_left_at(params, {4, 2, 2, 1, 2, 0, 0}, 1, 3);
+  expect_left_at(params, {4, 2, 2, 0, 0, -1, 0}, 1, 6);
+  EXPECT_FALSE(is_clipped(&params, {4, 2, 2, -1, -1, 1, 0}, 1, 1e6f));
+  EXPECT_FALSE(is_clipped(&params, {4, 2, 2, 0, 0, 1, 0}, 1, 1e6f));
   // The same rays at level 2, in voxels of 4.
-  EXPECT_EQ(clip_end(&params, {1, 0.5f, 0.5f, 1, 0, 0, 2}, 4), 1.5f);
-  EXPECT_EQ(clip_end(&params, {1, 0.5f, 0.5f, 0.25f, 0.5f, 0, 2}, 4), 3);
+  expect_left_at(params, {1, 0.5f, 0.5f, 1, 0, 0, 2}, 4, 1.5f);
+  expect_left_at(params, {1, 0.5f, 0.5f, 0.25f, 0.5f, 0, 2}, 4, 3);
   const ClipParams none = make_clip_params(info, frame.view, camera, {});
-  EXPECT_EQ(clip_end(&none, {4, 2, 2, 1, 0, 0, 0}, 1), INFINITY);
+  EXPECT_FALSE(is_clipped(&none, {4, 2, 2, 1, 0, 0, 0}, 1, 1e6f));
 }
 
 }  // namespace

@@ -110,9 +110,9 @@ TEST(Cuts, RaysVisitBricksByAscendingPlace) {
         glm::vec3 d;
         for (int axis = 0; axis < 3; ++axis)
           d[axis] = random.whole(0, 3) == 0 ? 0.0f : random.real(-1, 1);
-        check_ray(
-            cuts, places,
-            {make_ray_axis(eye.x, d.x), make_ray_axis(eye.y, d.y), make_ray_axis(eye.z, d.z)});
+        check_ray(cuts, places,
+                  make_whole_ray(make_ray_axis(eye.x, d.x), make_ray_axis(eye.y, d.y),
+                                 make_ray_axis(eye.z, d.z)));
         ++num_visits;
       }
     }

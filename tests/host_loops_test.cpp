@@ -38,7 +38,7 @@ TEST(HostLoops, AllGiveTheSameBits) {
   const ShadeParams shading = make_shade_params(volume.info(), {});
   const Image8 picture = shade_scalar(frame, shading, expected);
   const auto directions = make_ambient_directions(3);
-  const AmbientRays ambient{make_ambient_params(volume.info()), directions.data(), 3, &frame, 0};
+  const AmbientRays ambient{make_ambient_params(volume.info()), directions.data(), 3, &frame, 0, 1};
   const std::vector<FrameParams> frames = {frame};
   const std::vector<VolumeInfo> infos = {volume.info()};
   const std::vector<std::vector<float>> voxels = {volume.voxels};
@@ -56,7 +56,7 @@ TEST(HostLoops, AllGiveTheSameBits) {
       }
     }
     std::vector<uchar> counts(64 * 48);
-    loops.ambient(frame, blocks.field(), {0, 0, 64, 48}, ambient, hits.data(), counts.data());
+    loops.ambient({frame, blocks.field()}, {0, 0, 64, 48}, ambient, hits.data(), counts.data());
     EXPECT_EQ(counts, open);
     std::vector<std::uint8_t> row(3 * 64);
     loops.shade(frame, shading, 1, 23, hits.data(), nullptr, 0, row.data());

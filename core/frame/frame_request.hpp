@@ -32,8 +32,8 @@ enum class Evidence {
 struct FrameRequest {
   Camera camera{};
   float isovalue = 0;
-  Clip clip{};                      ///< the part of the volume that is drawn
   std::optional<ImageSize> size{};  ///< none: the renderer's largest
+  Clip clip{};                      ///< the part of the volume that is drawn
   /// Largest distance between voxels of a coarser level of detail [pixels], see
   /// make_level_frames(); 0: the finest level draws all.
   double voxel_pixels = 0;
