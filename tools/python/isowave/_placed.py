@@ -61,8 +61,8 @@ class Placed(Generic[Core]):
 
     @property
     def box(self) -> tuple[Vector, Vector]:
-        """Corners (x, y, z) of the least box around the volume with edges along the world's axes:
-        clip_box(*volume.box) cuts nothing."""
+        """Corners (x, y, z) of the least box around the volume with edges along the world's axes,
+        as clip_box() takes them."""
         edges = self.direction * self.spacing[::-1] * (np.array(self.shape[::-1]) - 1)
         origin = np.array(self.origin[::-1])
         x0, y0, z0 = (float(v) for v in origin + np.minimum(edges, 0).sum(axis=1))

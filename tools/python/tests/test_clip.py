@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -46,7 +47,11 @@ def rays_of(camera: isowave.Camera, size: tuple[int, int]) -> npt.NDArray[np.flo
 def expected(
     clip: Sequence[ClipPlane], caps: bool
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.bool_]]:
-    """Depth of the clipped ball, and which rays are far from where hits begin or end."""
+    """Depth of the clipped ball, and which rays neither graze it nor pass an edge.
+
+    The surface of the trilinear field is up to 0.03 voxels within the ball: h^2 / 8 RADIUS along
+    each of two axes. Along a ray that does not graze, that is at most 0.08.
+    """
     rays = rays_of(CAMERA, SIZE)
     begin, end = np.zeros(rays.shape[:2]), np.full(rays.shape[:2], np.inf)
     for plane in clip:
@@ -63,7 +68,7 @@ def expected(
     depth = np.where((off < RADIUS) & (depth < end), depth, np.inf)
     events = np.stack((enter, leave, begin, end))
     gaps = [np.abs(a - b) for i, a in enumerate(events) for b in events[:i] if a is not b]
-    return depth, (np.abs(off - RADIUS) > 0.15) & (np.min(gaps, axis=0) > 0.2)
+    return depth, np.where(half > 0, (half > 3.5) & (np.min(gaps, axis=0) > 0.2), off > RADIUS)
 
 
 CLIPS = {
@@ -148,7 +153,8 @@ def test_the_box_around_a_volume() -> None:
     assert np.allclose((begin, end), (corners.min(axis=0), corners.max(axis=0)))
     camera = volume.renderer(size=SIZE, device="host").camera(2)
     whole = volume.render(2, size=SIZE, camera=camera, device="host")
-    same = volume.render(2, size=SIZE, camera=camera, device="host", clip=clip_box(begin, end))
+    around: dict[str, Any] = {"clip": clip_box(begin, end), "caps": False}
+    same = volume.render(2, size=SIZE, camera=camera, device="host", **around)
     assert np.array_equal(whole.rgb, same.rgb)
 
 
