@@ -27,9 +27,8 @@ const std::string kSphere = "generate:sphere_33x33x33_float32 --exact -i " +
 class CliClip : public testing::Test {
  protected:
   CliClip() {
-    test::write_file(folder_ / "c.json",
-                     R"({"width":48,"height":48,"cameras":[{"eye":[16,16,116],"at":[16,16,16],
-                         "up":[0,1,0],"parallel_height":24}]})");
+    test::write_file(folder_ / "c.json", R"({"width":48,"height":48,"fovy_deg":60,"cameras":[
+        {"eye":[16,16,116],"at":[16,16,16],"up":[0,1,0],"parallel_height":24}]})");
   }
   FloatImage draw(const std::string &options) const {
     const auto result =
