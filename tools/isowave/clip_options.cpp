@@ -91,9 +91,10 @@ void add_clip_options(CLI::App &command, ClipOptions &options) {
                   "draws what lies in this box, with edges along the world's axes [world units]; "
                   "an empty number leaves that side open: ,,,,20,30")
       ->type_name("X0,X1,Y0,Y1,Z0,Z1");
-  command.add_flag("--no-caps", options.no_caps,
-                   "leave cuts open, which shows the surface from within, instead of capping what "
-                   "is inside the surface");
+  command.add_flag(
+      "--no-caps", options.no_caps,
+      "leave cuts open, which shows the surface from within; otherwise flat caps close "
+      "them where values are above the isovalue");
 }
 
 }  // namespace isowave::core::tools

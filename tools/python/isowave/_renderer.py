@@ -225,8 +225,8 @@ class Renderer:
             Up to 14 clipping planes, see ClipPlane and clip_box(): what is in all of their half
             spaces is drawn. A `max_error` by proof and the output "bounds" need whole surfaces.
         caps
-            Draws flat caps where planes cut what is inside the surface. Otherwise cuts are open,
-            and show the surface from within.
+            Draws flat caps where planes cut what is inside the surface: values above the isovalue.
+            Otherwise cuts are open, and show the surface from within.
         outputs
             Names of the arrays to bring back: "rgb", "depth", "normals", "position", "bounds".
         max_error
