@@ -7,6 +7,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <utility>
 #include <vector>
 
 namespace isowave::core {
@@ -102,6 +103,39 @@ TEST(RootOracle, SeesTwoUlpsOfDepth) {
   EXPECT_FALSE(RootOracle(voxels, {3, 3, 3}, std::nextafter(above, 2.0f))
                    .first_hit({{-1, 1, 1}, {1, 0, 0}})
                    .hit);
+}
+
+TEST(RootOracle, BeginsAnywhereOnARay) {
+  // |x - 4| along x from -2: inside up to x = 2.5, and from x = 5.5 on.
+  const auto voxels = sampled({9, 3, 3}, [](double x, double, double) { return std::abs(x - 4); });
+  const RootOracle oracle(voxels, {9, 3, 3}, 1.5f);
+  const OracleRay ray{{-2, 1.25, 1.5}, {0.5, 0, 0}};
+  for (const auto &[begin, t] : {std::pair(0.0, 9.0), std::pair(8.75, 9.0), std::pair(9.25, 15.0),
+                                 std::pair(14.875, 15.0)}) {
+    const OracleHit hit = oracle.first_hit(ray, begin);
+    ASSERT_TRUE(hit.hit) << begin;
+    EXPECT_NEAR(hit.t, t, 1e-13) << begin;
+  }
+  EXPECT_FALSE(oracle.first_hit(ray, 15.5).hit);
+  EXPECT_FALSE(oracle.first_hit(ray, 100).hit);
+  EXPECT_EQ(oracle.inside(ray, 8.75), true);
+  EXPECT_EQ(oracle.inside(ray, 9), true);
+  EXPECT_EQ(oracle.inside(ray, std::nextafter(9.0, 10.0)), false);
+  EXPECT_EQ(oracle.inside(ray, std::nextafter(15.0, 10.0)), false);
+  EXPECT_EQ(oracle.inside(ray, 15), true);
+}
+
+TEST(RootOracle, CellsWithoutDataHaveNoHit) {
+  const auto none = std::numeric_limits<double>::quiet_NaN();
+  const auto voxels =
+      sampled({9, 3, 3}, [&](double x, double, double) { return x == 3 ? none : x; });
+  const OracleRay ray{{-2, 1.25, 1.5}, {1, 0, 0}};
+  EXPECT_FALSE(RootOracle(voxels, {9, 3, 3}, 2.5f).first_hit(ray).hit);
+  EXPECT_NEAR(RootOracle(voxels, {9, 3, 3}, 4.5f).first_hit(ray).t, 6.5, 1e-13);
+  const RootOracle oracle(voxels, {9, 3, 3}, 4.5f);
+  EXPECT_EQ(oracle.inside(ray, 3.5), false);
+  EXPECT_EQ(oracle.inside(ray, 4.5), std::nullopt);
+  EXPECT_EQ(oracle.inside(ray, 7), true);
 }
 
 TEST(RootOracle, GradientIsTheFieldsDerivative) {
