@@ -61,7 +61,8 @@ class HardRays {
       }
     }
     if (d[0] == 0 && d[1] == 0 && d[2] == 0) d[whole(0, 2)] = 0.75f;
-    return {make_ray_axis(o[0], d[0]), make_ray_axis(o[1], d[1]), make_ray_axis(o[2], d[2])};
+    return make_whole_ray(make_ray_axis(o[0], d[0]), make_ray_axis(o[1], d[1]),
+                          make_ray_axis(o[2], d[2]));
   }
 
  private:
