@@ -221,10 +221,9 @@ TEST(HostRenderer, RaysOfAnyOriginHitWhatTheTwinFinds) {
   std::vector<HitRecord> expected;
   for (const WorldRay &ray : rays) {
     const glm::vec3 o(ray.origin), d(ray.direction);
-    expected.push_back(
-        trace_scalar(frame, volume.voxels, kDefaultSolver,
-                     make_whole_ray(make_ray_axis(o.x, d.x), make_ray_axis(o.y, d.y),
-                                    make_ray_axis(o.z, d.z))));
+    expected.push_back(trace_scalar(
+        frame, volume.voxels, kDefaultSolver,
+        make_whole_ray(make_ray_axis(o.x, d.x), make_ray_axis(o.y, d.y), make_ray_axis(o.z, d.z))));
     const float largest = std::max({std::abs(d.x), std::abs(d.y), std::abs(d.z)});
     ASSERT_TRUE(largest >= 0.5f && largest < 1.0f);
   }
