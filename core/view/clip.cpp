@@ -22,14 +22,15 @@ float limited(double distance) {
 
 std::array<ClipPlane, 6> box_planes(const glm::dvec3 &begin, const glm::dvec3 &end) {
   std::array<ClipPlane, 6> planes;
-  for (int axis = 0; axis < 3; ++axis) {
-    if (!(begin[axis] < end[axis]))
-      throw Error("the box that stays ends at {} along {}, and begins at {}", end[axis],
-                  "xyz"[axis], begin[axis]);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto i = static_cast<glm::length_t>(axis);
+    if (!(begin[i] < end[i]))
+      throw Error("the box that stays ends at {} along {}, and begins at {}", end[i], "xyz"[axis],
+                  begin[i]);
     glm::dvec3 normal(0);
-    normal[axis] = 1;
-    planes[std::size_t(2 * axis)] = {normal, begin[axis]};
-    planes[std::size_t(2 * axis + 1)] = {-normal, -end[axis]};
+    normal[i] = 1;
+    planes[2 * axis] = {normal, begin[i]};
+    planes[2 * axis + 1] = {-normal, -end[i]};
   }
   return planes;
 }

@@ -46,10 +46,11 @@ std::vector<ClipPlane> parse_box(const std::string &text) {
   const std::vector<std::optional<double>> sides = parse_list("--clip-box", text);
   if (sides.size() != 6) throw Error("--clip-box {}: give X0,X1,Y0,Y1,Z0,Z1", text);
   glm::dvec3 begin, end;
-  for (int axis = 0; axis < 3; ++axis) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
     constexpr double kOpen = std::numeric_limits<double>::infinity();
-    begin[axis] = sides[std::size_t(2 * axis)].value_or(-kOpen);
-    end[axis] = sides[std::size_t(2 * axis + 1)].value_or(kOpen);
+    const auto i = static_cast<glm::length_t>(axis);
+    begin[i] = sides[2 * axis].value_or(-kOpen);
+    end[i] = sides[2 * axis + 1].value_or(kOpen);
   }
   std::vector<ClipPlane> planes;
   for (const ClipPlane &plane : box_planes(begin, end)) {
