@@ -12,14 +12,14 @@
 #endif
 
 /// Has a ray met what is clipped?
-ISO_INLINE int meets_clipped(const FrameParams *frame, const ClipParams *clip, uint first_level,
-                             GivenRay given, HitRecord met) {
+ISO_INLINE int meets_clipped(const FrameParams *frame, global const ClipParams *clip,
+                             uint first_level, GivenRay given, HitRecord met) {
   const float in_first = (float)(1u << given.level), voxel = (float)(1u << first_level) * in_first;
   return is_clipped(clip, given, voxel, met.t / (frame->view.t_scale * in_first));
 }
 
 /// frame_params, frames, num_frames  as start_rays
-/// clip        of the frame
+/// clip [1]    of the frame
 /// first_level the finest level of detail that draws, of all
 /// directions  [num_rounds][ISO_AMBIENT_PATTERNS]
 /// round       0..num_rounds: the rays to make; num_rounds: none
@@ -29,7 +29,7 @@ ISO_INLINE int meets_clipped(const FrameParams *frame, const ClipParams *clip, u
 ///         a hit; given [pixel]
 /// Launch  grid-stride over pixels
 kernel void ambient(const FrameParams frame_params, global const FrameParams *frames,
-                    uint num_frames, const ClipParams clip, uint first_level,
+                    uint num_frames, global const ClipParams *clip, uint first_level,
                     const AmbientParams params, global const AmbientDirection *directions,
                     uint round, uint num_rounds, global const HitRecord *hits,
                     global const HitRecord *given_hits, global GivenRay *given,
@@ -46,8 +46,8 @@ kernel void ambient(const FrameParams frame_params, global const FrameParams *fr
     uint num_open = 0;
     if (round != 0) {
       const int meets = given_hits[pixel].t != INFINITY &&
-                        (clip.num_planes == 0 || !meets_clipped(frame, &clip, first_level,
-                                                                given[pixel], given_hits[pixel]));
+                        (clip->num_planes == 0 ||
+                         !meets_clipped(frame, clip, first_level, given[pixel], given_hits[pixel]));
       num_open = open_counts[pixel] + !meets;
     }
     open_counts[pixel] = (uchar)num_open;

@@ -125,7 +125,7 @@ ISO_INLINE int leave(const RayMarch *m, uint behind, global uint *ray_block_ids,
 /// first block in which anything happens decides, which an atomic_min of its place tells.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
     const FrameParams frame_params, global const FrameParams *frames, uint num_frames,
-    const ClipParams clip, uint parts, global const GivenRay *given,
+    global const ClipParams *clip, uint parts, global const GivenRay *given,
     global const uint *macrocell_masks, global const ushort *ranges, global const uint *no_data,
     uint no_data_begin, global BlockEntry *table, global const ulong *inside,
     global const SlotValue *cache_values, global const PassCounts *prev, global PassCounts *counts,
@@ -160,7 +160,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
     const uint pixel = m.entry.pixel;
     ISO_FRAME_OF(level, m.stand.block_id);
     const LastPlanes last = last_planes(level);
-    const Ray ray = ray_of(level, &clip, given, pixel);
+    const Ray ray = ray_of(level, clip, given, pixel);
     m.blocks = blocks + item;
     m.decides = decides + item / lanes;
     for (int is_first = 1, more = 1; more != 0; is_first = 0) {
@@ -183,13 +183,13 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
       barrier(CLK_LOCAL_MEM_FENCE);
     }
     if (m.result == ISO_RAY_HIT) {
-      hits[pixel] = hit_of(level, &clip, &ray, &m.change);
+      hits[pixel] = hit_of(level, clip, &ray, &m.change);
       ++num_hits;
       ++num_blocks;
     }
     uint behind = ISO_INVALID_ID, entry;
     if (leaves_band(m.result, m.is_gone && m.lane == 0)) {
-      behind = cross_borders(frames, num_frames, &clip, macrocell_masks, ranges, no_data,
+      behind = cross_borders(frames, num_frames, clip, macrocell_masks, ranges, no_data,
                              no_data_begin, pixel, level_of(frames, num_frames, m.stand.block_id),
                              leaves_on(m.result), m.blocks);
     }

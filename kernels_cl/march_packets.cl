@@ -341,7 +341,7 @@ ISO_INLINE uint count_chunks(const View *view, uint begins, uint num_rays) {
 #if ISO_BANDS
 /// The intervals of a packet's rays in a level of detail, and where the rays were before. Returns
 /// the lanes that have one.
-ISO_INLINE Mask make_intervals(const FrameParams *frame, const ClipParams *clip,
+ISO_INLINE Mask make_intervals(const FrameParams *frame, global const ClipParams *clip,
                                PacketSource source, PacketRays *r, Ints *before) {
   make_packet_axes(frame, source.column, source.row, r->axis);
   set_packet_interval(r, frame->band);
@@ -358,7 +358,7 @@ ISO_INLINE Mask make_intervals(const FrameParams *frame, const ClipParams *clip,
 
 /// Walks the rays of a packet through the band of a level of detail. In the first band, they begin;
 /// in others, those go on that have left the one before.
-ISO_INLINE void draw_packet(Packet *p, const PacketScene *scene, const ClipParams *clip,
+ISO_INLINE void draw_packet(Packet *p, const PacketScene *scene, global const ClipParams *clip,
                             int is_active_somewhere, PacketSource source, uint begins,
                             LaunchRays *rays) {
   const FrameParams *frame = scene->frame;
@@ -447,7 +447,7 @@ ISO_INLINE void march_packet(Packet *p, const PacketScene *scene, PacketSource s
 }
 
 /// Walks the rays of a packet on, and stores their hits, or where they wait.
-ISO_INLINE void draw_packet(Packet *p, const PacketScene *scene, const ClipParams *clip,
+ISO_INLINE void draw_packet(Packet *p, const PacketScene *scene, global const ClipParams *clip,
                             int is_active_somewhere, PacketSource source, uint begins,
                             LaunchRays *rays) {
   (void)clip;
@@ -477,7 +477,7 @@ ISO_INLINE void add_counts(const LaunchRays *rays, uint num_blocks, uint num_mad
 /// Walks rays on until they hit, leave or wait: those of the picture, in the first pass of a frame,
 /// or those that wait.
 ///
-/// clip             as start_rays
+/// clip [1]         as start_rays
 /// begins           ISO_BEGINS_FRAME: the first pass of a frame; ISO_BEGINS_BAND: a further band
 /// bands_behind     bands of the frame behind this one
 /// part_0 .. layout the zfp stream (block_stream.h), as free_slots for decoding on demand alone
@@ -490,7 +490,7 @@ ISO_INLINE void add_counts(const LaunchRays *rays, uint num_blocks, uint num_mad
 ///         counts->free_count shrinks
 /// Launch  groups of one work-item, which stride over chunks of packets
 kernel __attribute__((reqd_work_group_size(1, 1, 1))) void march_packets(
-    const FrameParams frame_params, const ClipParams clip, uint begins, uint bands_behind,
+    const FrameParams frame_params, global const ClipParams *clip, uint begins, uint bands_behind,
     global const uint *part_0, global const uint *part_1, global const uint *part_2,
     global const uint *part_3, global const uint *index, const StreamLayout layout,
     global const uint *macrocell_masks, global const ushort *ranges, global const uint *no_data,
@@ -571,7 +571,7 @@ kernel __attribute__((reqd_work_group_size(1, 1, 1))) void march_packets(
       Packet p;
       progress.met = progress.moved = ints(0);
       p.waits = p.found.lanes = ints(0);
-      draw_packet(&p, &scene, &clip, is_active_somewhere, source, begins, &rays);
+      draw_packet(&p, &scene, clip, is_active_somewhere, source, begins, &rays);
     }
   }
   end_streams();

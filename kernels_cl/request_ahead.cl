@@ -51,7 +51,7 @@ ISO_INLINE uint existing_corners(const FrameParams *frame, BlockCoords b) {
 ///         work-items, which share its blocks out among them
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_ahead(
     const FrameParams frame_params, global const FrameParams *frames, uint num_frames,
-    const ClipParams clip, global const GivenRay *given, global const uint *macrocell_masks,
+    global const ClipParams *clip, global const GivenRay *given, global const uint *macrocell_masks,
     global const BlockEntry *table, global PassCounts *counts, global const uint *active_ray_ids,
     global const uint *ray_block_ids, global uint *slot_stamps, global uint *requested_bits,
     global uint *request_block_ids, uint capacity, global CacheState *cache) {
@@ -84,7 +84,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_
       uint next = stand.block_id, side = stand.side;
       ISO_FRAME_OF(level, next);
       const LastPlanes last = last_planes(level);
-      const Ray ray = ray_of(level, &clip, given, entry.pixel);
+      const Ray ray = ray_of(level, clip, given, entry.pixel);
       const uint own = min(own_ahead(entry), frame->schedule.max_spec_count);
       const uint ahead =
           min(frame->schedule.per_ray_speculation ? max(own, least) : spec_count, most);

@@ -35,7 +35,7 @@ ISO_INLINE void clear_hits(global uint *words, uint count) {
 /// begins_frame  1: and with it a frame, for the stamps of cache slots (slot_stamps.h)
 /// frames  [num_frames] with levels of detail, those that draw, the finest first; frame_params is
 ///         the first of them
-/// clip    of the camera's rays, if ISO_CLIP is 1
+/// clip [1]  of the camera's rays, if ISO_CLIP is 1
 /// given   [pixel] the rays, if ISO_GIVEN_RAYS is 1
 /// ranges  of the blocks of all levels
 /// no_data, no_data_begin  as lacks_data_at_border
@@ -49,7 +49,7 @@ ISO_INLINE void clear_hits(global uint *words, uint count) {
 ///         parts, one after the other, as `parts` says (ocl::Range)
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_rays(
     const FrameParams frame_params, global const FrameParams *frames, uint num_frames,
-    const ClipParams clip, uint parts, uint begins_frame, global const GivenRay *given,
+    global const ClipParams *clip, uint parts, uint begins_frame, global const GivenRay *given,
     global const uint *macrocell_masks, global const ushort *ranges, global const uint *no_data,
     uint no_data_begin, global PassCounts *counts, global PassCounts *next,
     global uint *next_active_ray_ids, global uint *ray_block_ids,
@@ -82,12 +82,12 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_ra
     uint stand = ISO_INVALID_ID, log_ahead = ISO_FIRST_LOG_AHEAD;
     if (pixel != ISO_INVALID_ID && has_ray(given, pixel)) {
       ISO_FIRST_FRAME_OF(level, pixel);
-      const Ray ray = ray_of(level, &clip, given, pixel);
+      const Ray ray = ray_of(level, clip, given, pixel);
       if (!ISO_CLIP || has_interval(&ray))
         stand = begin_in_level(level, &ray, macrocell_masks, ranges, no_data, no_data_begin,
-                               side_where_cut(&clip, &ray), found + item);
+                               side_where_cut(clip, &ray), found + item);
       if (stand == ISO_INVALID_ID) {
-        stand = cross_borders(frames, num_frames, &clip, macrocell_masks, ranges, no_data,
+        stand = cross_borders(frames, num_frames, clip, macrocell_masks, ranges, no_data,
                               no_data_begin, pixel, 0, ISO_SIDE_UNKNOWN, found + item);
         log_ahead = ISO_BORDER_LOG_AHEAD;
       }

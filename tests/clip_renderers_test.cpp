@@ -185,6 +185,11 @@ TEST(ClippedOnTheHost, FramesAreTheTwins) {
 
 class ClippedOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
  protected:
+  void SetUp() override {
+    if (is_llvmpipe(GetParam()) && !long_tests())
+      GTEST_SKIP() << "compiling kernels that clip takes llvmpipe more than nine minutes";
+  }
+
   Seen check_device(const CompressedVolume &volume, RendererOptions options,
                     std::initializer_list<double> voxel_pixels) {
     options.size = kSize;
@@ -198,7 +203,7 @@ class ClippedOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
 INSTANTIATE_TEST_SUITE_P(Devices, ClippedOnDevice, testing::ValuesIn(devices_under_test()),
                          device_test_name);
 
-/// Small enough for Oclgrind and llvmpipe.
+/// Small enough for Oclgrind.
 TEST_P(ClippedOnDevice, SmallFrames) {
   const VolumeInfo info = placed_grid({14, 13, 17});
   const auto volume = pyramid_of(info, test::sample(info.dims, test::gyroid_field(6)));

@@ -235,8 +235,8 @@ void DeviceRenderer::begin_frame(const FrameRequest &request) {
   has_picture_ = false;
   size_ = size;
   rays_.num_ambient = 0;
-  rays_.clip =
-      make_clip_params(blocks_.levels[0].info, frames.front().view, request.camera, request.clip);
+  rays_.set_clip(
+      make_clip_params(blocks_.levels[0].info, frames.front().view, request.camera, request.clip));
   open_frame(std::move(frames), values, request.bound, RaySource::kCamera);
 }
 
@@ -445,7 +445,7 @@ std::vector<std::uint64_t> DeviceRenderer::blocked_rays(std::uint32_t round,
       const float in_first = std::ldexp(1.0f, static_cast<int>(given[ray].level)),
                   voxel = std::ldexp(in_first, static_cast<int>(blocks_.drawing.first));
       const float t_scale = blocks_.level_frames->front().view.t_scale * in_first;
-      meets = !is_clipped(&rays_.clip, given[ray], voxel, met[ray].t / t_scale);
+      meets = !is_clipped(&rays_.clip_params(), given[ray], voxel, met[ray].t / t_scale);
     }
     blocked[ray / 64] |= std::uint64_t{meets} << ray % 64;
   }

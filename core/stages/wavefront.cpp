@@ -1,5 +1,7 @@
 #include "core/stages/wavefront.hpp"
 
+#include <cstring>
+
 namespace isowave::core {
 
 ocl::BufferSizes Wavefront::sizes(const Limits &limits) {
@@ -11,6 +13,7 @@ ocl::BufferSizes Wavefront::sizes(const Limits &limits) {
           ocl::buffer_size<PassCounts>("pass counts, previous", 1),
           ocl::buffer_size<PassCounts>("pass counts, next", 1),
           ocl::buffer_size<FrameParams>("level frames", limits.num_levels),
+          ocl::buffer_size<ClipParams>("clipping planes", 1),
           ocl::buffer_size<HitRecord>("hits", rays),
           ocl::buffer_size<GivenRay>("given rays", given),
           ocl::buffer_size<HitRecord>("hits of given rays", given),
@@ -32,6 +35,7 @@ Wavefront::Wavefront(ocl::Device &device, const Limits &limits)
 Wavefront::Wavefront(ocl::Device &device, std::uint64_t rays, const ocl::BufferSizes &sizes)
     : num_rays(rays),
       level_frames(device, sizes["level frames"]),
+      clip(device, sizes["clipping planes"]),
       counts(device, sizes["pass counts"]),
       previous_counts(device, sizes["pass counts, previous"]),
       next_counts(device, sizes["pass counts, next"]),
@@ -49,6 +53,15 @@ Wavefront::Wavefront(ocl::Device &device, std::uint64_t rays, const ocl::BufferS
       pair_rays(device, sizes["rays of pairs"]),
       closest_pairs(device, sizes["closest pairs"]) {
   reset_counts();
+  clip.write({&clip_params_, 1});
+}
+
+void Wavefront::set_clip(const ClipParams &params) {
+  // Whole volumes are all alike.
+  const ClipParams next = params.num_planes == 0 ? ClipParams{} : params;
+  if (std::memcmp(&next, &clip_params_, sizeof(next)) == 0) return;
+  clip_params_ = next;
+  clip.write({&clip_params_, 1});
 }
 
 }  // namespace isowave::core

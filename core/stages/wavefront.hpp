@@ -71,8 +71,12 @@ struct Wavefront {
     std::swap(previous_counts, counts);
   }
 
-  /// Is a part of the volume not drawn?
-  bool is_clipped() const { return clip.num_planes != 0; }
+  /// The part of the volume that the frame at work draws.
+  ///
+  /// Waits  if it changes
+  void set_clip(const ClipParams &params);
+  const ClipParams &clip_params() const { return clip_params_; }
+  bool is_clipped() const { return clip_params_.num_planes != 0; }
 
   /// The hits of the rays of a source.
   ocl::Buffer<HitRecord> &hits_of(RaySource source) {
@@ -81,11 +85,11 @@ struct Wavefront {
 
   std::uint64_t num_rays;  ///< R
   FrameParams
-      frame{};        ///< of the frame at work; of several levels of detail, the finest that draws
-  ClipParams clip{};  ///< of the frame at work
+      frame{};  ///< of the frame at work; of several levels of detail, the finest that draws
   ocl::Buffer<FrameParams>
       level_frames;  ///< [num_level_frames] of all that draw (pipeline `rays` with several)
   std::uint32_t num_level_frames = 1;
+  ocl::Buffer<ClipParams> clip;       ///< [1] clip_params()
   CountsBuffer counts;                ///< [1] of the pass at work
   CountsBuffer previous_counts;       ///< [1] of the pass before, if open_pass() is called
   CountsBuffer next_counts;           ///< [1] of the next such pass, opened by this one
@@ -108,6 +112,8 @@ struct Wavefront {
 
  private:
   Wavefront(ocl::Device &device, std::uint64_t rays, const ocl::BufferSizes &sizes);
+
+  ClipParams clip_params_{};
 };
 
 }  // namespace isowave::core

@@ -102,7 +102,7 @@ ISO_INLINE uint side_at_end(const FrameParams *frame, global const uint *macroce
 /// side  side on which the ray left; unknown: the border is in a block that is as a whole on one
 ///       side, or in a cell without data
 ISO_INLINE uint cross_borders(global const FrameParams *frames, uint num_frames,
-                              const ClipParams *clip, global const uint *macrocell_masks,
+                              global const ClipParams *clip, global const uint *macrocell_masks,
                               global const ushort *ranges, global const uint *no_data,
                               uint no_data_begin, uint pixel, uint level, uint side,
                               local uint *found) {

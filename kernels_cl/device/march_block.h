@@ -198,7 +198,7 @@ ISO_INLINE uint leaves_on(int result) {
                                          : ISO_SIDE_UNKNOWN;
 }
 
-ISO_INLINE HitRecord hit_of(const FrameParams *frame, const ClipParams *clip, const Ray *ray,
+ISO_INLINE HitRecord hit_of(const FrameParams *frame, global const ClipParams *clip, const Ray *ray,
                             const BlockChange *found) {
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
   const float s =

@@ -137,7 +137,7 @@ ISO_SELDOM uint side_at_border(const PacketField *field, const FrameParams *fram
 
 /// The hit of a ray where it begins, in that cell. Returns 0 if a block is missing.
 ISO_SELDOM int hit_at_border(const PacketField *field, const FrameParams *frame,
-                             const ClipParams *clip, const Ray *ray, BlockCoords cell,
+                             global const ClipParams *clip, const Ray *ray, BlockCoords cell,
                              global HitRecord *hit) {
   const int x = (int)cell.x, y = (int)cell.y, z = (int)cell.z;
   const GridWalk walk = walk_from(ray, x, y, z, 1, last_planes(frame));
@@ -160,8 +160,9 @@ ISO_INLINE void wait_in_cell(const FrameParams *frame, BlockCoords cell, uint si
 
 /// Lanes that may hit where they begin, since they were on another side before, do so, or wait for
 /// a block there. Returns those that go on.
-ISO_SELDOM Mask cross_border(const PacketScene *scene, const ClipParams *clip, const PacketRays *r,
-                             Ints ray_ids, Ints before, Mask lanes, LaunchRays *rays) {
+ISO_SELDOM Mask cross_border(const PacketScene *scene, global const ClipParams *clip,
+                             const PacketRays *r, Ints ray_ids, Ints before, Mask lanes,
+                             LaunchRays *rays) {
   const FrameParams *frame = scene->frame;
   Mask on = ints(0);
   ISO_EACH_LANE(lane, lanes) {

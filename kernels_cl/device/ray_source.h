@@ -6,7 +6,7 @@
 
 /// The ray of the camera with this number, in the index space of the frame's level, with its
 /// interval there.
-ISO_INLINE Ray camera_ray(const FrameParams *frame, const ClipParams *clip, uint pixel) {
+ISO_INLINE Ray camera_ray(const FrameParams *frame, global const ClipParams *clip, uint pixel) {
   Ray ray = make_ray(frame, pixel);
   (void)clip;
 #if ISO_CLIP
@@ -19,7 +19,7 @@ ISO_INLINE Ray camera_ray(const FrameParams *frame, const ClipParams *clip, uint
 ///
 /// given  [pixel] the list; not read if ISO_GIVEN_RAYS is 0
 /// clip   only read if ISO_CLIP is 1
-ISO_INLINE Ray ray_of(const FrameParams *frame, const ClipParams *clip,
+ISO_INLINE Ray ray_of(const FrameParams *frame, global const ClipParams *clip,
                       global const GivenRay *given, uint pixel) {
 #if ISO_GIVEN_RAYS
   (void)clip;

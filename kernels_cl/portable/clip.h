@@ -14,8 +14,9 @@
 ISO_NAMESPACE_BEGIN
 
 /// The rays's distance from a plane as an axis. See make_ray().
-ISO_INLINE RayAxis make_plane_axis(const View *view, const ClipParams *clip,
-                                   const PlaneParams *plane, float u, float v, float length) {
+ISO_INLINE RayAxis make_plane_axis(const View *view, ISO_GLOBAL const ClipParams *clip,
+                                   ISO_GLOBAL const PlaneParams *plane, float u, float v,
+                                   float length) {
   return make_camera_axis(view->is_parallel, u, v, length,
                           plane->eye * (clip->t_scale / view->t_scale), plane->fwd, plane->right,
                           plane->up);
@@ -23,7 +24,8 @@ ISO_INLINE RayAxis make_plane_axis(const View *view, const ClipParams *clip,
 
 /// Shortens the interval of a ray of the camera to what is in front of all planes. An empty one
 /// ends where it begins, or before.
-ISO_INLINE void clip_ray(const FrameParams *frame, const ClipParams *clip, uint pixel, Ray *ray) {
+ISO_INLINE void clip_ray(const FrameParams *frame, ISO_GLOBAL const ClipParams *clip, uint pixel,
+                         Ray *ray) {
   const RayOfView r = ray_of_view(&frame->view, pixel);
   float begin = 0.0f, end = INFINITY;
   int cut_by = ISO_NOT_CUT;
@@ -49,18 +51,18 @@ ISO_INLINE int has_interval(const Ray *ray) {
 }
 
 /// Does a ray that begins inside the surface hit there?
-ISO_INLINE int begins_at_cap(const ClipParams *clip, const Ray *ray) {
+ISO_INLINE int begins_at_cap(ISO_GLOBAL const ClipParams *clip, const Ray *ray) {
   return ISO_CLIP && ray->cut_by != ISO_NOT_CUT && clip->with_caps != 0;
 }
 
 /// The side on which a ray that begins at a clipping plane was before (ISO_SIDE_*).
-ISO_INLINE uint side_where_cut(const ClipParams *clip, const Ray *ray) {
+ISO_INLINE uint side_where_cut(ISO_GLOBAL const ClipParams *clip, const Ray *ray) {
   return begins_at_cap(clip, ray) ? ISO_SIDE_OUTSIDE : ISO_SIDE_UNKNOWN;
 }
 
 /// Makes a hit where a clipped ray begins one of a cap.
-ISO_INLINE void cap_hit(const ClipParams *clip, const Ray *ray, HitRecord *hit) {
-  const PlaneParams *plane = &clip->planes[ray->cut_by];
+ISO_INLINE void cap_hit(ISO_GLOBAL const ClipParams *clip, const Ray *ray, HitRecord *hit) {
+  ISO_GLOBAL const PlaneParams *plane = &clip->planes[ray->cut_by];
   hit->cell |= ISO_CAP;
   hit->grad_x = plane->grad_x;
   hit->grad_y = plane->grad_y;
@@ -75,10 +77,10 @@ ISO_INLINE int is_cap(HitRecord hit) {
 ///
 /// given  in the index space of a level of detail
 /// voxel  its voxels' size [voxels of the finest level]
-ISO_INLINE int is_clipped(const ClipParams *clip, GivenRay given, float voxel, float t) {
+ISO_INLINE int is_clipped(ISO_GLOBAL const ClipParams *clip, GivenRay given, float voxel, float t) {
   int behind = 0;
   for (uint i = 0; i < clip->num_planes; ++i) {
-    const PlaneParams *p = &clip->planes[i];
+    ISO_GLOBAL const PlaneParams *p = &clip->planes[i];
     const float d = fma(p->grad_x, given.d_x, fma(p->grad_y, given.d_y, p->grad_z * given.d_z)),
                 o = fma(p->grad_x, given.o_x, fma(p->grad_y, given.o_y, p->grad_z * given.o_z));
     behind |= d < 0.0f && fma(voxel, fma(t, d, o), p->first_voxel) < 0.0f;

@@ -10,14 +10,14 @@
 ISO_PACKET_NAMESPACE_BEGIN
 
 /// clip_ray() of the rays of pixels (column, row).
-ISO_INLINE void clip_packet(const FrameParams *frame, const ClipParams *clip, Ints column, Ints row,
-                            PacketRays *rays) {
+ISO_INLINE void clip_packet(const FrameParams *frame, ISO_GLOBAL const ClipParams *clip,
+                            Ints column, Ints row, PacketRays *rays) {
   const PacketOfView r = packet_of_view(&frame->view, column, row);
   const float scale = clip->t_scale / frame->view.t_scale;
   Floats begin = floats(0.0f), end = floats(INFINITY);
   Ints cut_by = ints(ISO_NOT_CUT);
   for (uint i = 0; i < clip->num_planes; ++i) {
-    const PlaneParams *plane = &clip->planes[i];
+    ISO_GLOBAL const PlaneParams *plane = &clip->planes[i];
     PacketAxis a;
     make_packet_camera_axis(&frame->view, r.u, r.v, r.length, plane->eye * scale, plane->fwd,
                             plane->right, plane->up, 0.0f, &a);
