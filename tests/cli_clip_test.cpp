@@ -145,6 +145,34 @@ TEST(CliClipOptions, WhatIsNoPlaneIsRefused) {
   refuse(many + "--clip-box 0,1,0,1,0,1", "15 clipping planes: up to 14 can be drawn");
 }
 
+/// Every ray of twin and device, judged by the oracle of clipped frames.
+TEST(CliClipVerify, FramesAreTheOracles) {
+  test::TemporaryFolder folder;
+  const std::string frames =
+      "verify " + kSphere + " --size 48x36 --clip 0.2,-1,0.1 --clip-box ,,,,,18";
+  for (const std::string options : {"", " --no-caps", " --device cpu"}) {
+    const auto result =
+        test::run_isowave(frames + options + " --json " + quoted(folder / "v.json"));
+    ASSERT_EQ(result.status, 0) << options << "\n" << result.err;
+    const json frame = json::parse(test::read_file(folder / "v.json"))["frames"][0];
+    EXPECT_EQ(frame["oracle"], "clip");
+    EXPECT_EQ(frame["rays"], 48 * 36);
+    EXPECT_GT(frame["hits"], 10);
+    EXPECT_EQ(frame["caps"] > 10, options != " --no-caps") << frame;
+    EXPECT_LT(frame["undecided"], 5);
+    for (const char *failure :
+         {"missed", "false", "wrong_kinds", "wrong_places", "wrong_gradients"})
+      EXPECT_EQ(frame[failure], 0) << failure;
+  }
+}
+
+TEST(CliClipOptions, WhatVerifyCannotClip) {
+  expect_one_line_error("verify --clip 1,0,0", "--clip is for frames: give a VOLUME");
+  const std::string frames = "verify " + kSphere + " --clip 1,0,0 ";
+  expect_one_line_error(frames + "--oracle roots", "--oracle: clipped frames have an oracle");
+  expect_one_line_error(frames + "--max-surface-error 1", "--max-surface-error: errors are proven");
+}
+
 TEST(CliClipOptions, WhatDrawsWholeSurfacesRefusesThem) {
   const std::string render = "render " + kSphere + " --size 16x12 --clip 1,0,0 ";
   expect_one_line_error(

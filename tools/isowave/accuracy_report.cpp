@@ -37,4 +37,27 @@ nlohmann::ordered_json accuracy_json(const Accuracy &tally) {
           {"residual_voxels", quantiles_json(quantiles(tally.residual))}};
 }
 
+void print_clip_accuracy_header(std::string_view what) {
+  fmt::print("{:<28} {:>9} {:>9} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>9}\n", what, "rays", "hits",
+             "caps", "missed", "false", "kind", "place", "gradient", "undecided");
+}
+
+void print_clip_accuracy(std::string_view name, const ClipAccuracy &tally) {
+  fmt::print("{:<28} {:>9} {:>9} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>9}\n", name, tally.rays,
+             tally.hits, tally.caps, tally.missed, tally.false_hits, tally.wrong_kinds,
+             tally.wrong_places, tally.wrong_gradients, tally.undecided);
+}
+
+nlohmann::ordered_json clip_accuracy_json(const ClipAccuracy &tally) {
+  return {{"rays", tally.rays},
+          {"hits", tally.hits},
+          {"caps", tally.caps},
+          {"missed", tally.missed},
+          {"false", tally.false_hits},
+          {"wrong_kinds", tally.wrong_kinds},
+          {"wrong_places", tally.wrong_places},
+          {"wrong_gradients", tally.wrong_gradients},
+          {"undecided", tally.undecided}};
+}
+
 }  // namespace isowave::core::tools

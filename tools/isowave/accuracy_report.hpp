@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "reference/accuracy.hpp"
+#include "reference/clip_oracle.hpp"
 
 namespace isowave::core::tools {
 
@@ -12,5 +13,10 @@ void print_accuracy_header(std::string_view what);
 void print_accuracy(std::string_view name, const Accuracy &tally);
 nlohmann::ordered_json quantiles_json(const Quantiles &quantiles);
 nlohmann::ordered_json accuracy_json(const Accuracy &tally);
+
+// The same of clipped frames.
+void print_clip_accuracy_header(std::string_view what);
+void print_clip_accuracy(std::string_view name, const ClipAccuracy &tally);
+nlohmann::ordered_json clip_accuracy_json(const ClipAccuracy &tally);
 
 }  // namespace isowave::core::tools

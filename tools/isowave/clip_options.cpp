@@ -62,8 +62,8 @@ std::vector<ClipPlane> parse_box(const std::string &text) {
 
 }  // namespace
 
-std::vector<isowave::ClipPlane> read_clip(const ClipOptions &options, const VolumeInfo &info) {
-  Clip clip;
+Clip read_clip(const ClipOptions &options, const VolumeInfo &info) {
+  Clip clip{.caps = !options.no_caps};
   for (const std::string &text : options.planes) clip.planes.push_back(parse_plane(text, info));
   if (!options.box.empty()) {
     const std::vector<ClipPlane> sides = parse_box(options.box);
@@ -72,10 +72,7 @@ std::vector<isowave::ClipPlane> read_clip(const ClipOptions &options, const Volu
   if (options.no_caps && clip.planes.empty())
     throw Error("--no-caps: nothing is cut: give --clip or --clip-box");
   check_clip(clip);
-  std::vector<isowave::ClipPlane> planes;
-  for (const ClipPlane &plane : clip.planes)
-    planes.push_back({{plane.normal.x, plane.normal.y, plane.normal.z}, plane.offset});
-  return planes;
+  return clip;
 }
 
 void add_clip_options(CLI::App &command, ClipOptions &options) {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "core/api/isowave/frame.hpp"
+#include "core/view/clip.hpp"
 #include "core/volume/volume.hpp"
 
 namespace isowave::core::tools {
@@ -23,6 +23,6 @@ void add_clip_options(CLI::App &command, ClipOptions &options);
 ///
 /// info    planes without a distance go through the middle of this volume
 /// Throws  Error in one line: what the options cannot mean, for any volume
-std::vector<isowave::ClipPlane> read_clip(const ClipOptions &options, const VolumeInfo &info);
+Clip read_clip(const ClipOptions &options, const VolumeInfo &info);
 
 }  // namespace isowave::core::tools

@@ -14,6 +14,7 @@
 
 #include "core/api/choices.hpp"
 #include "core/api/device_renderer.hpp"
+#include "core/api/convert.hpp"
 #include "core/api/frame_parts.hpp"
 #include "core/api/renderer_implementation.hpp"
 #include "core/base/error.hpp"
@@ -211,8 +212,9 @@ isowave::FrameRequest FrameOfMany::request() const {
   request.isovalue = isovalue;
   request.size = {size.width, size.height, size.samples};
   request.appearance = drawing.appearance;
-  request.clip = options.clip_planes;
-  request.caps = !options.clip.no_caps;
+  for (const ClipPlane &plane : options.clip.planes)
+    request.clip.push_back({from_glm(plane.normal), plane.offset});
+  request.caps = options.clip.caps;
   // A volume too small for coarser levels is drawn by its finest.
   const bool has_one_level = drawing.on_host() && drawing.whole.coarser_levels.empty();
   request.voxel_pixels = has_one_level ? 0 : options.voxel_pixels;
@@ -419,7 +421,7 @@ void set_up(const CLI::App &command, RenderArgs &options, Drawing &drawing) {
   }
   together(drawing.team, [&] {
     outputs.make_folder();
-    options.clip_planes = read_clip(options.clip, drawing.info());
+    options.clip = read_clip(options.clip_options, drawing.info());
     make_renderer(options, drawing);
   });
   if (compiling) compiling->finish();

@@ -121,7 +121,7 @@ void check_options(const CLI::App &command, const RenderArgs &options, const Tea
   check_ambient_rays(options.ambient_rays);
   with_fewer_planes({}, options.frame.voxel_error);  // or throws
   check_voxel_pixels(options.voxel_pixels);
-  read_clip(options.clip, {});  // or throws
+  read_clip(options.clip_options, {});  // or throws
   if (options.renderer_flags.pipeline == "blocks")
     refuse_options(command, {"--clip", "--clip-box"}, "--pipeline blocks draws whole volumes");
   if (draws_bounds(options)) {
@@ -233,7 +233,7 @@ void add_render_options(CLI::App &command, RenderArgs &options) {
       ->capture_default_str();
   add_normals_option(command, options.normals);
   add_ambient_option(command, options.ambient_rays);
-  add_clip_options(command, options.clip);
+  add_clip_options(command, options.clip_options);
   command.add_option("--output,-o", options.image,
                      "PNG of the picture; NAME_isoV_viewK.png if there are several frames "
                      "[VOLUME_isoV.png in the current folder, if no other output is asked for]");

@@ -22,8 +22,8 @@ struct RenderArgs {
   std::string input;
   VolumeOptions volume;
   FrameOptions frame;
-  ClipOptions clip;
-  std::vector<isowave::ClipPlane> clip_planes;  ///< what `clip` asks for
+  ClipOptions clip_options;
+  Clip clip;  ///< what they ask for
   std::string device;
   RendererFlags renderer_flags;
   RendererOptions renderer;  ///< what the flags ask for

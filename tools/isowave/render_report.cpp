@@ -28,11 +28,11 @@ nlohmann::ordered_json tries_json(const DetailChoice &choice, const char *share)
   return tries;
 }
 
-nlohmann::ordered_json clip_json(const RenderArgs &options) {
+nlohmann::ordered_json clip_json(const Clip &clip) {
   nlohmann::ordered_json planes = nlohmann::ordered_json::array();
-  for (const isowave::ClipPlane &plane : options.clip_planes)
-    planes.push_back({{"normal", plane.normal}, {"offset", plane.offset}});
-  return {{"planes", planes}, {"caps", !options.clip.no_caps}};
+  for (const auto &[normal, offset] : clip.planes)
+    planes.push_back({{"normal", {normal.x, normal.y, normal.z}}, {"offset", offset}});
+  return {{"planes", planes}, {"caps", clip.caps}};
 }
 
 /// The source of the errors of a volume's voxels and levels, on which bounds rest.
@@ -163,7 +163,7 @@ nlohmann::ordered_json options_json(const RenderArgs &options, ImageSize size,
   json["voxel_pixels"] = options.voxel_pixels;
   json["normals"] = options.normals;
   json["ambient"] = options.ambient_rays;
-  json["clip"] = clip_json(options);
+  json["clip"] = clip_json(options.clip);
   return json;
 }
 

@@ -115,16 +115,20 @@ std::uint64_t verify_solver(const VerifyArgs &options, std::string_view name, oc
 void check_options(const CLI::App &command, const VerifyArgs &options) {
   for (const std::string &name : options.solvers) solver_from_string(name);
   if (options.frames.input.empty()) {
-    refuse_options(
-        command,
-        {"--oracle", "--isovalue", "--voxel-error", "--size", "--orbit", "--cameras", "--dims",
-         "--type", "--spacing", "--rate", "--tolerance", "--tolerance-relative", "--exact"},
-        "is for frames: give a VOLUME");
+    refuse_options(command,
+                   {"--oracle", "--clip", "--clip-box", "--no-caps", "--isovalue", "--voxel-error",
+                    "--size", "--orbit", "--cameras", "--dims", "--type", "--spacing", "--rate",
+                    "--tolerance", "--tolerance-relative", "--exact"},
+                   "is for frames: give a VOLUME");
   } else {
     refuse_options(command, {"--rays", "--watertight", "--seed"},
                    "is for the suite: leave out VOLUME");
     if (options.frames.frame.isovalues.empty())
       throw Error("{}: give --isovalue", options.frames.input);
+  }
+  if (!read_clip(options.frames.clip, {}).planes.empty()) {
+    refuse_options(command, {"--oracle"}, "clipped frames have an oracle of their own");
+    refuse_options(command, {"--max-surface-error"}, "errors are proven of whole surfaces");
   }
   refuse_options(command, {"--levels"},
                  options.frames.max_surface_error ? "--max-surface-error has all levels of detail"

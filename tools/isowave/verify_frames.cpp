@@ -11,6 +11,7 @@
 #include "core/render/device_renderer.hpp"
 #include "core/zfp/isovalue.hpp"
 #include "reference/cell_oracle.hpp"
+#include "reference/clip_oracle.hpp"
 #include "reference/embree_reach.hpp"
 #include "reference/mesh_oracle.hpp"
 #include "reference/ray_rounding.hpp"
@@ -127,30 +128,59 @@ void judge_all(const std::vector<FrameJudge> &judges, const FrameParams &frame, 
   }
 }
 
+/// A clipped frame before its oracle: a row and an entry.
+///
+/// voxels  of the volume: one array
+void judge_clipped_frame(const Scene &scene, std::size_t view, const Clip &clip,
+                         const FrameParams &frame, std::span<const std::vector<float>> voxels,
+                         std::span<const HitRecord> hits, const ordered_json &labels,
+                         ordered_json &document, Totals &totals) {
+  const auto begin = Clock::now();
+  const ClipOracle oracle(scene.volume.info, scene.cameras[view], clip, {&frame, 1}, voxels);
+  const ClipAccuracy tally = judge_clipped(oracle, hits);
+  print_clip_accuracy(fmt::format("clip, isovalue {}, view {}", frame.surface.isovalue, view),
+                      tally);
+  ordered_json entry = {{"oracle", "clip"}};
+  entry.update(clip_accuracy_json(tally));
+  entry["seconds"] = seconds_since(begin);
+  entry.update(labels);
+  document["frames"].push_back(std::move(entry));
+  totals.failures += tally.failures();
+  ++totals.judged;
+}
+
+std::vector<FrameJudge> make_judges(const std::vector<std::string> &names,
+                                    std::span<const float> voxels, const Dims &dims,
+                                    float isovalue) {
+  std::vector<FrameJudge> judges;
+  for (const std::string &name : names) {
+    const auto begin = Clock::now();
+    judges.push_back(make_judge(name, voxels, dims, isovalue));
+    fmt::print("oracle {}, isovalue {}: {} ({:.1f} s)\n", name, isovalue, judges.back().contents,
+               seconds_since(begin));
+  }
+  return judges;
+}
+
 }  // namespace
 
 std::uint64_t verify_frames(const VerifyFramesOptions &options,
                             const std::vector<std::string> &solvers, ordered_json &document) {
   const Scene scene =
       load_scene(options.input, options.volume, options.frame, read_views(options.frame));
-  const std::vector<float> voxels = decode_with_libzfp(scene.volume, options.frame.voxel_error);
+  const std::vector<std::vector<float>> voxels{
+      decode_with_libzfp(scene.volume, options.frame.voxel_error)};
+  const Clip clip = read_clip(options.clip, scene.volume.info);
   const glm::uvec3 dims = scene.volume.info.dims;
-  const std::vector<std::string> names = options.oracles.empty()
-                                             ? std::vector<std::string>{"roots", "cells", "mesh"}
-                                             : options.oracles;
+  std::vector<std::string> names = options.oracles;
+  if (names.empty() && clip.planes.empty()) names = {"roots", "cells", "mesh"};
   Totals totals;
   for (const double given : options.frame.isovalues) {
     const float isovalue = drawn_isovalue(scene.volume, given);
-    std::vector<FrameJudge> judges;
-    for (const std::string &name : names) {
-      const auto begin = Clock::now();
-      judges.push_back(make_judge(name, voxels, {dims.x, dims.y, dims.z}, isovalue));
-      fmt::print("oracle {}, isovalue {}: {} ({:.1f} s)\n", name, isovalue, judges.back().contents,
-                 seconds_since(begin));
-    }
+    const auto judges = make_judges(names, voxels[0], {dims.x, dims.y, dims.z}, isovalue);
     for (const std::string &solver : solvers) {
       const Drawer drawer = make_drawer(scene, options.device, solver_from_string(solver));
-      print_accuracy_header(solver);
+      (clip.planes.empty() ? print_accuracy_header : print_clip_accuracy_header)(solver);
       for (std::size_t view = 0; view < scene.cameras.size(); ++view) {
         const FrameParams frame =
             make_frame_params(scene.volume.info, scene.cameras[view], scene.size, isovalue);
@@ -161,10 +191,14 @@ std::uint64_t verify_frames(const VerifyFramesOptions &options,
                                      {"view", view}};
         drawer.renderer->render({.camera = scene.cameras[view],
                                  .isovalue = frame.surface.isovalue,
+                                 .clip = clip,
                                  .voxel_error = options.frame.voxel_error,
                                  .normals = Normals::kCell});
         const std::vector<HitRecord> hits = drawer.renderer->hits();
-        judge_all(judges, frame, view, hits, labels, document, totals);
+        if (clip.planes.empty())
+          judge_all(judges, frame, view, hits, labels, document, totals);
+        else
+          judge_clipped_frame(scene, view, clip, frame, voxels, hits, labels, document, totals);
         const Quantiles rounding =
             quantiles(ray_rounding(scene.volume.info, scene.cameras[view], scene.size, hits));
         fmt::print(
@@ -185,6 +219,7 @@ void add_verify_frames_options(CLI::App &command, VerifyFramesOptions &options) 
                      "volume whose frames are judged, instead of the suite");
   add_volume_options(command, options.volume);
   add_frame_options(command, options.frame);
+  add_clip_options(command, options.clip);
   command
       .add_option(
           "--oracle", options.oracles,
