@@ -149,7 +149,7 @@ TEST(CliClipOptions, WhatIsNoPlaneIsRefused) {
 TEST(CliClipVerify, FramesAreTheOracles) {
   test::TemporaryFolder folder;
   const std::string frames =
-      "verify " + kSphere + " --size 48x36 --clip 0.2,-1,0.1 --clip-box ,,,,,18";
+      "verify " + kSphere + " --size 48x36 --clip 0.2,-1,0.1 --clip-box ,,,,,28";
   for (const std::string options : {"", " --no-caps", " --device cpu"}) {
     const auto result =
         test::run_isowave(frames + options + " --json " + quoted(folder / "v.json"));
@@ -167,7 +167,7 @@ TEST(CliClipVerify, FramesAreTheOracles) {
 }
 
 TEST(CliClipOptions, WhatVerifyCannotClip) {
-  expect_one_line_error("verify --clip 1,0,0", "--clip is for frames: give a VOLUME");
+  expect_one_line_error("verify --clip 1,0,0", "--clip: is for frames: give a VOLUME");
   const std::string frames = "verify " + kSphere + " --clip 1,0,0 ";
   expect_one_line_error(frames + "--oracle roots", "--oracle: clipped frames have an oracle");
   expect_one_line_error(frames + "--max-surface-error 1", "--max-surface-error: errors are proven");

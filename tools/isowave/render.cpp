@@ -13,8 +13,8 @@
 #include <utility>
 
 #include "core/api/choices.hpp"
-#include "core/api/device_renderer.hpp"
 #include "core/api/convert.hpp"
+#include "core/api/device_renderer.hpp"
 #include "core/api/frame_parts.hpp"
 #include "core/api/renderer_implementation.hpp"
 #include "core/base/error.hpp"
