@@ -112,6 +112,32 @@ TEST_P(ApiOnDevice, FramesAreThoseOfTheEngine) {
   EXPECT_EQ(read.pixels, rgba);
 }
 
+TEST_P(ApiOnDevice, PicturesWithoutABackground) {
+  Renderer renderer(open_device(selector()), sphere(), {.largest = {64, 48, 1}, .cache_blocks = 8});
+  FrameRequest request = small_request(renderer);
+  const Frame opaque = renderer.render(request);
+  request.appearance.transparent = true;
+  std::vector<std::uint8_t> last;
+  request.on_pass = [&](const Progress &progress) {
+    last = progress.picture();
+    return true;
+  };
+  const Frame frame = renderer.render(request);
+  EXPECT_EQ(last, frame.picture);
+  ASSERT_EQ(frame.picture.size(), 4u * 64 * 48);
+  for (std::size_t i = 0; i < frame.depth.size(); ++i) {
+    const bool is_hit = std::isfinite(frame.depth[i]);
+    ASSERT_EQ(frame.picture[4 * i + 3], is_hit ? 255 : 0) << "pixel " << i;
+    for (std::size_t channel = 0; channel < 3; ++channel)
+      ASSERT_EQ(frame.picture[4 * i + channel], is_hit ? opaque.picture[3 * i + channel] : 0);
+  }
+  const test::TemporaryFolder folder;
+  save_png(frame, folder / "a.png");
+  const core::Image8 read = core::read_png(folder / "a.png");
+  EXPECT_EQ(read.channels, 4);
+  EXPECT_EQ(read.pixels, std::vector<std::uint8_t>(frame.picture));
+}
+
 /// Where coarse levels draw, hits are at the depth that is said, too.
 TEST_P(ApiOnDevice, PositionsOfLevelsAreInTheWorld) {
   Renderer renderer(open_device(selector()), sphere({.rate = 16, .levels = 2}),

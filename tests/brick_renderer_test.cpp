@@ -77,11 +77,12 @@ class BrickTeamOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
   }
 
   /// What one renderer draws.
-  Image8 picture_of_one(const FrameRequest &request, const RendererOptions &options) {
+  Image8 picture_of_one(const FrameRequest &request, const RendererOptions &options,
+                        const Appearance &appearance = {}) {
     ocl::Device device(GetParam());
     DeviceRenderer renderer(device, volume_.compressed, options);
     renderer.render(request);
-    return renderer.shade();
+    return renderer.shade(appearance);
   }
 
   TestVolume volume_{{37, 30, 26}, test::gyroid_field(9)};
@@ -134,10 +135,14 @@ TEST_P(BrickTeamOnDevice, AWordForEachColourOfManyBricks) {
     alone.render(request);
     TeamRenderer renderer(device, brick, {.size = kFrame}, cuts, {volume_.info()}, team);
     renderer.render(request);
+    EXPECT_EQ(renderer.shade({.transparent = true}).pixels,
+              alone.shade({.transparent = true}).pixels);
+    const CompositionStats before = renderer.composition();
     EXPECT_EQ(renderer.shade({}).pixels, alone.shade().pixels);
     EXPECT_GT(renderer.num_hits({}), 0u);
     const std::uint64_t rays = kFrame.num_rays();
-    EXPECT_EQ(renderer.composition().bytes, size == 255 ? 8 * ((rays + 1) / 2) : 8 * rays);
+    EXPECT_EQ(renderer.composition().bytes - before.bytes,
+              size == 255 ? 8 * ((rays + 1) / 2) : 8 * rays);
   }
 }
 
@@ -153,6 +158,39 @@ TEST_P(BrickTeamOnDevice, ParallelRays) {
       const Image8 image = renderer.shade({});
       EXPECT_TRUE(rank != 0 || image.pixels == whole.pixels);
     });
+  }
+}
+
+/// With one ray a pixel, colours are put together; with several, hits; ambient rays have both
+/// whole.
+TEST_P(BrickTeamOnDevice, TransparentPictures) {
+  constexpr Appearance kTransparent{.transparent = true};
+  for (const std::uint32_t samples : {1u, 2u}) {
+    for (const std::uint32_t ambient_rays : {0u, 1u}) {
+      request_.ambient_rays = ambient_rays;
+      const RendererOptions options{.size = {kFrame.width, kFrame.height, samples},
+                                    .with_given_rays = true};
+      const Image8 whole = picture_of_one(request_, options, kTransparent);
+      ASSERT_EQ(whole.channels, 4u);
+      on_ranks(3, options, [&](TeamRenderer &renderer, std::uint32_t rank) {
+        std::vector<Image8> images;
+        FrameRequest request = request_;
+        request.on_pass = [&](const PassStats &) {
+          images.push_back(renderer.shade(kTransparent));
+          return true;
+        };
+        renderer.render(request);
+        images.push_back(renderer.shade(kTransparent));
+        const Image8 opaque = renderer.shade({});
+        if (rank != 0) return;
+        EXPECT_GT(images.size(), 2u);
+        EXPECT_EQ(images.front().channels, 4u);
+        EXPECT_EQ(images[images.size() - 2].pixels, whole.pixels);
+        EXPECT_EQ(images.back().pixels, whole.pixels);
+        EXPECT_EQ(images.back().channels, 4u);
+        EXPECT_EQ(opaque.channels, 3u);
+      });
+    }
   }
 }
 

@@ -100,7 +100,7 @@ class BricksOnDevice : public testing::TestWithParam<PipelineOnDevice> {
       renderer.render({.camera = cameras[view], .isovalue = isovalue});
       Image8 image{options.size.width, options.size.height, 3,
                    std::vector<std::uint8_t>(3 * num_rays)};
-      set_colors(frame.colors, 0, image.pixels);
+      set_colors(frame.colors, 0, 3, image.pixels);
       EXPECT_EQ(image.pixels, renderer.shade().pixels);
       num_hits += test::num_hits(expected);
     }

@@ -43,7 +43,8 @@ struct Expected {
   std::vector<std::uint8_t> pixels;
   std::size_t num_hits = 0;
 };
-Expected compose_one_by_one(const std::vector<std::vector<std::uint32_t>> &by_place) {
+Expected compose_one_by_one(const std::vector<std::vector<std::uint32_t>> &by_place,
+                            std::size_t channels) {
   Expected expected;
   for (std::size_t ray = 0; ray < by_place.front().size(); ++ray) {
     const auto first =
@@ -52,6 +53,7 @@ Expected compose_one_by_one(const std::vector<std::vector<std::uint32_t>> &by_pl
     const std::uint32_t color = (first == by_place.end() ? by_place.front() : *first)[ray];
     for (const int shift : {0, 8, 16})
       expected.pixels.push_back(static_cast<std::uint8_t>(color >> shift));
+    if (channels == 4) expected.pixels.push_back(first == by_place.end() ? 0 : 255);
   }
   return expected;
 }
@@ -62,10 +64,10 @@ TEST(Compose, ColoursOfTheFirstBrickThatIsHit) {
     SCOPED_TRACE(num_rays);
     std::vector<std::vector<std::uint32_t>> by_place;
     for (int brick = 0; brick < 3; ++brick) by_place.push_back(random_colors(num_rays, rng));
-    const Expected expected = compose_one_by_one(by_place);
 
-    const auto composed = [&](Reduction how, std::size_t rays_per_word, const auto &make,
-                              const auto &take) {
+    const auto composed = [&](Reduction how, std::size_t rays_per_word, std::uint32_t channels,
+                              const auto &make, const auto &take) {
+      const Expected expected = compose_one_by_one(by_place, channels);
       const std::size_t num_words = (num_rays + rays_per_word - 1) / rays_per_word;
       std::vector<std::uint64_t> words(num_words, ~std::uint64_t{0}), own(num_words);
       const std::uint32_t places[] = {0, 100, 254};
@@ -74,16 +76,20 @@ TEST(Compose, ColoursOfTheFirstBrickThatIsHit) {
         reduce_into(words, own, how);
       }
       // In two parts, as threads take them.
-      Image8 image{std::uint32_t(num_rays), 1, 3, std::vector<std::uint8_t>(3 * num_rays)};
+      Image8 image{std::uint32_t(num_rays), 1, channels,
+                   std::vector<std::uint8_t>(channels * num_rays)};
       const std::span all = words;
       const std::size_t part = num_words / 2;
-      const std::size_t num_hits = take(all.first(part), 0, image.pixels) +
-                                   take(all.subspan(part), rays_per_word * part, image.pixels);
+      const std::size_t num_hits =
+          take(all.first(part), 0, channels, image.pixels) +
+          take(all.subspan(part), rays_per_word * part, channels, image.pixels);
       EXPECT_EQ(image.pixels, expected.pixels);
       EXPECT_EQ(num_hits, expected.num_hits);
     };
-    composed(Reduction::kMin, 1, color_words, set_colors);
-    composed(Reduction::kMinOfHalves, 2, color_halves, set_half_colors);
+    for (const std::uint32_t channels : {3u, 4u}) {
+      composed(Reduction::kMin, 1, channels, color_words, set_colors);
+      composed(Reduction::kMinOfHalves, 2, channels, color_halves, set_half_colors);
+    }
   }
 }
 

@@ -64,7 +64,8 @@ Camera public_camera(const core::Camera &camera) {
 
 core::Appearance core_appearance(const Appearance &appearance) {
   return {to_glm(appearance.surface), to_glm(appearance.background), appearance.ambient,
-          appearance.diffuse,         appearance.specular,           appearance.above};
+          appearance.diffuse,         appearance.specular,           appearance.above,
+          appearance.transparent};
 }
 
 core::FrameRequest core_request(const FrameRequest &request, const core::CompressedVolume &volume) {

@@ -19,9 +19,11 @@ std::uint64_t make_word(const HitRecord &hit, std::uint32_t place, std::uint32_t
 constexpr std::uint32_t kNoHalfPlace = 0xFF;
 constexpr std::uint32_t kColor = 0xFFFFFF;
 
-std::uint8_t *write_color(std::uint32_t color, std::uint8_t *to) {
+std::uint8_t *write_color(std::uint32_t color, bool is_hit, std::size_t channels,
+                          std::uint8_t *to) {
   for (int channel = 0; channel < 3; ++channel)
     *to++ = static_cast<std::uint8_t>(color >> (8 * channel));
+  if (channels == 4) *to++ = is_hit ? 255 : 0;
   return to;
 }
 
@@ -50,12 +52,13 @@ void color_words(std::span<const std::uint32_t> colors, std::uint32_t place,
 }
 
 std::size_t set_colors(std::span<const std::uint64_t> words, std::size_t begin,
-                       std::span<std::uint8_t> picture) {
-  std::uint8_t *to = picture.data() + 3 * begin;
+                       std::size_t channels, std::span<std::uint8_t> picture) {
+  std::uint8_t *to = picture.data() + channels * begin;
   std::size_t num_hits = 0;
   for (const std::uint64_t word : words) {
-    num_hits += word >> 32 != kNoPlace;
-    to = write_color(static_cast<std::uint32_t>(word), to);
+    const bool is_hit = word >> 32 != kNoPlace;
+    num_hits += is_hit;
+    to = write_color(static_cast<std::uint32_t>(word), is_hit, channels, to);
   }
   return num_hits;
 }
@@ -71,16 +74,16 @@ void color_halves(std::span<const std::uint32_t> colors, std::uint32_t place,
 }
 
 std::size_t set_half_colors(std::span<const std::uint64_t> words, std::size_t begin,
-                            std::span<std::uint8_t> picture) {
+                            std::size_t channels, std::span<std::uint8_t> picture) {
   static_assert(std::endian::native == std::endian::little);
   const auto hits_of = [](std::uint64_t word) {
     return std::size_t{word >> 56 != kNoHalfPlace} + ((word >> 24 & 0xFF) != kNoHalfPlace);
   };
-  std::uint8_t *to = picture.data() + 3 * begin;
+  std::uint8_t *to = picture.data() + channels * begin;
   std::size_t num_hits = 0;
-  // Four pixels at once are 12 bytes, of which compilers make two stores.
+  // Four pixels of RGB at once are 12 bytes, of which compilers make two stores.
   const std::uint8_t *end = picture.data() + picture.size();
-  for (; words.size() >= 2 && end - to >= 12; words = words.subspan(2), to += 12) {
+  for (; channels == 3 && words.size() >= 2 && end - to >= 12; words = words.subspan(2), to += 12) {
     const std::uint64_t head =
         (words[0] & kColor) | (words[0] >> 32 & kColor) << 24 | (words[1] & 0xFFFF) << 48;
     const auto tail = static_cast<std::uint32_t>((words[1] & kColor) >> 16 | words[1] >> 32 << 8);
@@ -92,8 +95,9 @@ std::size_t set_half_colors(std::span<const std::uint64_t> words, std::size_t be
     for (const auto half :
          {static_cast<std::uint32_t>(word), static_cast<std::uint32_t>(word >> 32)}) {
       if (to == end) break;
-      num_hits += half >> 24 != kNoHalfPlace;
-      to = write_color(half, to);
+      const bool is_hit = half >> 24 != kNoHalfPlace;
+      num_hits += is_hit;
+      to = write_color(half, is_hit, channels, to);
     }
   }
   return num_hits;

@@ -34,10 +34,11 @@ void color_words(std::span<const std::uint32_t> colors, std::uint32_t place,
                  std::span<std::uint64_t> words);
 /// Gives a picture's pixels from `begin` on the colours that won.
 ///
-/// picture  [pixels][3] RGB
-/// Returns  the number of pixels with a hit
+/// channels  3: RGB; 4: RGBA, A 255 where there is a hit, else 0
+/// picture   [pixels][channels]
+/// Returns   the number of pixels with a hit
 std::size_t set_colors(std::span<const std::uint64_t> words, std::size_t begin,
-                       std::span<std::uint8_t> picture);
+                       std::size_t channels, std::span<std::uint8_t> picture);
 
 /// Most bricks for which half a word is enough.
 inline constexpr std::uint32_t kMostHalfWordBricks = 0xFF;
@@ -46,6 +47,6 @@ void color_halves(std::span<const std::uint32_t> colors, std::uint32_t place,
                   std::span<std::uint64_t> words);
 /// As set_colors(). begin: even.
 std::size_t set_half_colors(std::span<const std::uint64_t> words, std::size_t begin,
-                            std::span<std::uint8_t> picture);
+                            std::size_t channels, std::span<std::uint8_t> picture);
 
 }  // namespace isowave::core

@@ -201,7 +201,7 @@ void TeamRenderer::reduce(std::size_t count, Reduction how, Receiver who, const 
   composition_.bytes += count * sizeof(std::uint64_t);
 }
 
-void TeamRenderer::compose_colors(std::span<const std::uint32_t> colors,
+void TeamRenderer::compose_colors(std::span<const std::uint32_t> colors, std::size_t channels,
                                   std::span<std::uint8_t> picture) {
   const bool in_halves = team_.size() <= kMostHalfWordBricks;
   const std::size_t per_word = in_halves ? 2 : 1;
@@ -215,7 +215,8 @@ void TeamRenderer::compose_colors(std::span<const std::uint32_t> colors,
            (in_halves ? color_halves : color_words)(own, place_, words);
          },
          [&](std::size_t begin, std::span<const std::uint64_t> words) {
-           num_hits += (in_halves ? set_half_colors : set_colors)(words, per_word * begin, picture);
+           num_hits += (in_halves ? set_half_colors : set_colors)(words, per_word * begin, channels,
+                                                                  picture);
          });
   num_hits_ = num_hits;
 }
@@ -283,9 +284,10 @@ HostArray<std::uint8_t> TeamRenderer::compose_picture(const Appearance &appearan
     return picture;
   }
   const HostArray<std::uint32_t> colors = renderer_.shade_packed(appearance);
+  const std::size_t channels = appearance.transparent ? 4 : 3;
   HostArray<std::uint8_t> picture;
-  if (receives) picture = memory_.array<std::uint8_t>(3 * colors.size());
-  compose_colors({colors.data(), colors.size()}, {picture.data(), picture.size()});
+  if (receives) picture = memory_.array<std::uint8_t>(channels * colors.size());
+  compose_colors({colors.data(), colors.size()}, channels, {picture.data(), picture.size()});
   return picture;
 }
 

@@ -86,8 +86,9 @@ class TeamRenderer : public Renderer {
   void reduce(std::size_t count, Reduction how, Receiver who, const MakeWords &make,
               const TakeWords &take);
   HostArray<std::uint8_t> compose_picture(const Appearance &appearance);
-  /// picture [pixels][3]: at rank 0 only.
-  void compose_colors(std::span<const std::uint32_t> colors, std::span<std::uint8_t> picture);
+  /// picture [pixels][channels]: at rank 0 only.
+  void compose_colors(std::span<const std::uint32_t> colors, std::size_t channels,
+                      std::span<std::uint8_t> picture);
   /// Puts together a word of each ray.
   void compose(Receiver who, const MakeWords &make, const TakeWords &take);
   /// The hits that win among all bricks'.

@@ -24,13 +24,15 @@ ShadeParams make_shade_params(const VolumeInfo &info, const Appearance &appearan
   params.surface_r = appearance.surface.r;
   params.surface_g = appearance.surface.g;
   params.surface_b = appearance.surface.b;
-  params.background_r = appearance.background.r;
-  params.background_g = appearance.background.g;
-  params.background_b = appearance.background.b;
+  const glm::vec3 background = appearance.transparent ? glm::vec3(0) : appearance.background;
+  params.background_r = background.r;
+  params.background_g = background.g;
+  params.background_b = background.b;
   params.ambient = appearance.ambient;
   params.diffuse = appearance.diffuse;
   params.specular = appearance.specular;
   params.above = appearance.above;
+  params.transparent = appearance.transparent ? 1 : 0;
   return params;
 }
 
@@ -38,12 +40,14 @@ Image8 shade_scalar(const FrameParams &frame, const ShadeParams &params,
                     const std::vector<HitRecord> &hits, std::uint32_t samples,
                     const OpenCounts &open) {
   const std::uint32_t columns = frame.view.width / samples, rows = frame.view.height / samples;
-  Image8 image{columns, rows, 3, std::vector<std::uint8_t>(std::size_t{3} * columns * rows)};
+  const std::uint32_t channels = num_channels(&params);
+  Image8 image{columns, rows, channels,
+               std::vector<std::uint8_t>(std::size_t{channels} * columns * rows)};
   for (uint pixel = 0; pixel < columns * rows; ++pixel) {
     const uint rgba = shade_pixel(&frame, &params, samples, pixel % columns, pixel / columns,
                                   hits.data(), open.counts.data(), open.num_ambient);
-    for (uint channel = 0; channel < 3; ++channel)
-      image.pixels[std::size_t{3} * pixel + channel] =
+    for (uint channel = 0; channel < channels; ++channel)
+      image.pixels[std::size_t{channels} * pixel + channel] =
           static_cast<std::uint8_t>(rgba >> 8 * channel);
   }
   return image;

@@ -19,6 +19,9 @@ struct Appearance {
   float diffuse = 0.5f;   ///< diffuse light of a headlight at the eye
   float specular = 0.2f;  ///< its highlight
   float above = 0.45f;    ///< diffuse light from above the headlight
+  /// Pictures are RGBA with straight alpha: the share of a pixel's rays that hit, and the mean
+  /// colour of those alone; 0 0 0 0 if none hits. There is no background.
+  bool transparent = false;
 };
 
 /// The number of ambient rays of each hit that met nothing.
@@ -37,7 +40,7 @@ ShadeParams make_shade_params(const VolumeInfo &info, const Appearance &appearan
 /// hits     [height * width] hits of the frame's rays
 /// samples  rays per pixel along each axis
 /// open     open ambient rays of the hits
-/// Returns  RGB
+/// Returns  RGB, or RGBA if transparent
 Image8 shade_scalar(const FrameParams &frame, const ShadeParams &params,
                     const std::vector<HitRecord> &hits, std::uint32_t samples = 1,
                     const OpenCounts &open = {});

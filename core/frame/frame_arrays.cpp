@@ -28,7 +28,8 @@ HitMap make_hit_map(std::span<const VolumeInfo> levels) {
 }
 
 Image8 image_of(ImageSize size, const HostArray<std::uint8_t> &picture) {
-  return {size.width, size.height, 3, picture.copy()};
+  const std::size_t channels = picture.size() / size.num_pixels();
+  return {size.width, size.height, static_cast<std::uint32_t>(channels), picture.copy()};
 }
 
 void add_hit_arrays(const WantedArrays &wanted, std::span<const HitRecord> hits,

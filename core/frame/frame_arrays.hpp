@@ -22,7 +22,8 @@ struct WantedArrays {
 /// Arrays of one frame; those that were not wanted are empty. Rays are [rows][columns], row 0 at
 /// the top.
 struct FrameArrays {
-  HostArray<std::uint8_t> picture;             ///< RGB [height][width][3]
+  /// RGB [height][width][3]; RGBA [height][width][4] if Appearance::transparent
+  HostArray<std::uint8_t> picture;
   HostArray<float> depth;                      ///< see HitRecord::t
   HostArray<std::array<float, 3>> normals;     ///< see world_normal()
   HostArray<std::array<double, 3>> positions;  ///< see hit_position()

@@ -91,7 +91,7 @@ class Renderer {
   /// The wanted arrays, in memory that may serve the next frame's once they are gone. Positions
   /// need Abilities::cells.
   virtual FrameArrays fetch(const WantedArrays &wanted, const Appearance &appearance) = 0;
-  /// RGB [size.height][size.width], row 0 at the top.
+  /// RGB, or RGBA if `appearance.transparent`, [size.height][size.width], row 0 at the top.
   Image8 shade(const Appearance &appearance = {});
   /// Distances from the eye [world units], as hits().
   std::vector<float> depth() { return fetch({.depth = true}, {}).depth.copy(); }

@@ -150,13 +150,14 @@ inline void ambient(const HostLevel &level, const RayTile &tile, const AmbientRa
 
 inline void shade(const FrameParams &frame, const ShadeParams &params, uint samples, uint row,
                   const HitRecord *hits, const uchar *open_counts, uint num_ambient,
-                  std::uint8_t *rgb) {
-  const uint columns = frame.view.width / samples;
-  for (uint column = 0; column < columns; ++column) {
+                  std::uint8_t *picture) {
+  const uint columns = frame.view.width / samples, channels = num_channels(&params);
+  for (uint column = 0; column < columns; ++column, picture += channels) {
     const uint rgba =
         shade_pixel(&frame, &params, samples, column, row, hits, open_counts, num_ambient);
     for (uint channel = 0; channel < 3; ++channel)
-      rgb[3 * column + channel] = static_cast<std::uint8_t>(rgba >> (8 * channel));
+      picture[channel] = static_cast<std::uint8_t>(rgba >> (8 * channel));
+    if (channels == 4) picture[3] = static_cast<std::uint8_t>(rgba >> 24);
   }
 }
 
@@ -192,8 +193,9 @@ ISO_WHOLE_LOOP void ambient_anywhere(const HostLevel &level, const RayTile &tile
 }
 ISO_WHOLE_LOOP void shade_anywhere(const FrameParams &frame, const ShadeParams &params,
                                    uint samples, uint row, const HitRecord *hits,
-                                   const uchar *open_counts, uint num_ambient, std::uint8_t *rgb) {
-  shade(frame, params, samples, row, hits, open_counts, num_ambient, rgb);
+                                   const uchar *open_counts, uint num_ambient,
+                                   std::uint8_t *picture) {
+  shade(frame, params, samples, row, hits, open_counts, num_ambient, picture);
 }
 
 /// One level is a special case of several.
@@ -254,8 +256,8 @@ ISO_WIDE_LOOP void ambient_wide(const HostLevel &level, const RayTile &tile,
 }
 ISO_WIDE_LOOP void shade_wide(const FrameParams &frame, const ShadeParams &params, uint samples,
                               uint row, const HitRecord *hits, const uchar *open_counts,
-                              uint num_ambient, std::uint8_t *rgb) {
-  shade(frame, params, samples, row, hits, open_counts, num_ambient, rgb);
+                              uint num_ambient, std::uint8_t *picture) {
+  shade(frame, params, samples, row, hits, open_counts, num_ambient, picture);
 }
 
 uint trace_sse4(const FrameParams &frame, const HostField &field, const RayTile &tile,

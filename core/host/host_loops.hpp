@@ -157,10 +157,10 @@ struct HostLoops {
   ///
   /// samples      rays per pixel along each axis
   /// open_counts  [height * width] open rays among num_ambient; num_ambient 0: there are none
-  /// rgb          [width / samples][3]
+  /// picture      [width / samples][num_channels()]
   void (*shade)(const FrameParams &frame, const ShadeParams &params, uint samples, uint row,
                 const HitRecord *hits, const uchar *open_counts, uint num_ambient,
-                std::uint8_t *rgb);
+                std::uint8_t *picture);
 };
 
 /// The loops that this processor can run, the fastest last.

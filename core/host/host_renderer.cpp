@@ -292,11 +292,12 @@ FrameArrays HostRenderer::fetch(const WantedArrays &wanted, const Appearance &ap
   const ShadeParams params = make_shade_params(info_, appearance);
   FrameArrays arrays;
   if (wanted.picture) {
-    arrays.picture = memory_.array<std::uint8_t>(3 * size_.num_pixels());
+    const std::size_t channels = num_channels(&params);
+    arrays.picture = memory_.array<std::uint8_t>(channels * size_.num_pixels());
     parallel_for(size_.height, num_threads_, [&](std::uint64_t row, std::uint32_t) {
       host_loops().shade(frame_, params, size_.samples, static_cast<uint>(row), hits_.data(),
                          open_.counts.data(), open_.num_ambient,
-                         arrays.picture.data() + std::size_t{3} * size_.width * row);
+                         arrays.picture.data() + channels * size_.width * row);
     });
   }
   const HitMap map = make_hit_map(levels());

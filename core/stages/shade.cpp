@@ -47,16 +47,17 @@ void Shade::compile(Wavefront &rays) {
   }
 }
 
-/// Enqueues the picture and its copy: RGBA if the image has words, else RGB.
+/// Enqueues the picture and its copy: RGBA if it is transparent or the image has words, else RGB.
 template <class T>
 void Shade::shade(const ShadeParams &params, Wavefront &rays, std::uint32_t samples,
                   HostArray<T> &image) {
-  constexpr bool kWithAlpha = sizeof(T) == sizeof(uint);
+  constexpr bool kAsWords = sizeof(T) == sizeof(uint);
   const std::size_t num_pixels =
       std::size_t{rays.frame.view.width / samples} * (rays.frame.view.height / samples);
-  image = memory_.array<T>(kWithAlpha ? num_pixels : 3 * num_pixels);
+  image = memory_.array<T>(kAsWords ? num_pixels : num_channels(&params) * num_pixels);
   shade_(ocl::Range::strided(num_items(num_pixels), ocl::kGroupSize, device_), rays.frame, params,
-         samples, rays.hits, rays.open_counts, rays.num_ambient, kWithAlpha ? 1u : 0u, staging_);
+         samples, rays.hits, rays.open_counts, rays.num_ambient,
+         kAsWords || params.transparent != 0 ? 1u : 0u, staging_);
   staging_.read_async(std::as_writable_bytes(std::span(image.data(), image.size())), copied_);
 }
 

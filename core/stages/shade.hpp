@@ -28,7 +28,7 @@ class Shade {
   /// Waits    once
   FrameArrays operator()(const WantedArrays &wanted, const ShadeParams &params, const HitMap &map,
                          Wavefront &rays, std::uint32_t samples);
-  /// The picture as RGBA, red in bits 0..7, A 0 if no ray of a pixel hits.
+  /// The picture as RGBA, red in bits 0..7, see shade_pixel(). A is 0 if no ray of a pixel hits.
   ///
   /// Waits  yes
   HostArray<uint> packed(const ShadeParams &params, Wavefront &rays, std::uint32_t samples);

@@ -18,12 +18,18 @@ typedef struct ShadeParams {
       normal[9];  ///< row-major: gradient in index space -> normal in world space (up to a factor)
   float view[9];  ///< row-major: ray direction in index space -> world space (up to a factor)
   float surface_r, surface_g, surface_b;
-  float background_r, background_g, background_b;
-  float ambient;            ///< weight of light from all around
-  float diffuse, specular;  ///< of the headlight; its highlight is white
-  float above;              ///< weight of the light above
+  float background_r, background_g, background_b;  ///< 0 if transparent
+  float ambient;                                   ///< weight of light from all around
+  float diffuse, specular;                         ///< of the headlight; its highlight is white
+  float above;                                     ///< weight of the light above
+  uint transparent;  ///< 0 or 1: pictures have an alpha, and no background
 } ShadeParams;
-ISO_CHECK_SIZE(ShadeParams, 112);
+ISO_CHECK_SIZE(ShadeParams, 116);
+
+/// Bytes of a pixel: RGB, or RGBA.
+ISO_INLINE uint num_channels(const ShadeParams *p) {
+  return p->transparent ? 4u : 3u;
+}
 
 /// Cosines of surface and viewer below which the side that is seen is in doubt, and slopes count
 /// less: at silhouettes, normals turn from one side to the other.
@@ -108,19 +114,21 @@ ISO_INLINE Color shade_ray(const FrameParams *frame, const ShadeParams *p, uint 
 }
 
 /// RGBA of the pixel at a column and row of the picture, 8 bits each, red in bits 0..7. The pixel
-/// has samples times samples rays of the frame. A is 255 if any of them hits, else 0.
+/// has samples times samples rays of the frame. If pictures are transparent, the colour is the mean
+/// of the rays that hit, and A is their share of all rays (straight alpha); 0 0 0 0 if none hits.
+/// Otherwise the colour is the mean of all rays, and A is 255 if any of them hits, else 0.
 ///
 /// open_counts  [ray] ambient rays of its hit that met nothing (ambient.h)
 /// num_ambient  ambient rays of a hit; 0: there are none, and all is open
 ISO_INLINE uint shade_pixel(const FrameParams *frame, const ShadeParams *p, uint samples,
                             uint column, uint row, ISO_GLOBAL const HitRecord *hits,
                             ISO_GLOBAL const uchar *open_counts, uint num_ambient) {
-  const float share = 1.0f / (float)(samples * samples);
+  const uint num_rays = samples * samples;
   const uint first_ray = row * samples * frame->view.width + column * samples;
-  float r = 0.0f, g = 0.0f, b = 0.0f;
-  uint i, a = 0;
+  float r = 0.0f, g = 0.0f, b = 0.0f, share;
+  uint i, num_hits = 0;
   if (samples == 1 && hits[first_ray].t == INFINITY) return background_pixel(p);
-  for (i = 0; i < samples * samples; ++i) { /* in one order on every device */
+  for (i = 0; i < num_rays; ++i) { /* in one order on every device */
     const uint ray_id = first_ray + i / samples * frame->view.width + i % samples;
     const Color color =
         shade_ray(frame, p, ray_id, hits[ray_id].t, hits[ray_id].grad_x, hits[ray_id].grad_y,
@@ -129,9 +137,15 @@ ISO_INLINE uint shade_pixel(const FrameParams *frame, const ShadeParams *p, uint
     r += color.r;
     g += color.g;
     b += color.b;
-    if (hits[ray_id].t != INFINITY) a = 255;
+    if (hits[ray_id].t != INFINITY) ++num_hits;
   }
-  return pixel_of(r * share, g * share, b * share, a);
+  if (p->transparent) {
+    if (num_hits == 0) return 0;
+    share = 1.0f / (float)num_hits;
+    return pixel_of(r * share, g * share, b * share, (255 * num_hits + num_rays / 2) / num_rays);
+  }
+  share = 1.0f / (float)num_rays;
+  return pixel_of(r * share, g * share, b * share, num_hits != 0 ? 255 : 0);
 }
 
 /// The normal of a hit in world space, of length 1, away from larger values; 0 if there is no hit,

@@ -44,6 +44,9 @@ struct Appearance {
   float ambient = 0.15f;                  ///< light from all around
   float diffuse = 0.5f, specular = 0.2f;  ///< light of a headlight at the eye
   float above = 0.45f;  ///< light from halfway between the eye and the picture's upper edge
+  /// Pictures are RGBA with straight alpha: the share of a pixel's rays that hit, and the mean
+  /// colour of those alone; 0 0 0 0 if none hits. There is no background.
+  bool transparent = false;
 };
 
 /// The picture so far, for FrameRequest::on_pass, and only until on_pass returns. Several threads
@@ -58,7 +61,7 @@ class Progress {
   /// Size of picture(): the frame's, except that the first pictures within a time budget are
   /// smaller.
   virtual ImageSize size() const = 0;
-  /// RGB [height][width][3], row 0 at the top.
+  /// RGB [height][width][3], row 0 at the top; RGBA [4] if Appearance::transparent.
   virtual Array<std::uint8_t> picture() const = 0;
 };
 
@@ -169,6 +172,7 @@ void for_each_field(Request &request, const Visit &visit) {
   visit("diffuse", request.appearance.diffuse);
   visit("specular", request.appearance.specular);
   visit("above", request.appearance.above);
+  visit("transparent", request.appearance.transparent);
   visit("clip", request.clip);
   visit("caps", request.caps);
   visit("voxel_pixels", request.voxel_pixels);
@@ -233,7 +237,8 @@ struct Frame {
   ImageSize size{};
   std::uint32_t rows = 0, columns = 0;  ///< numbers of rays
 
-  Array<std::uint8_t> picture{};          ///< RGB [height][width][3]
+  /// RGB [height][width][3]; RGBA [height][width][4] if Appearance::transparent
+  Array<std::uint8_t> picture{};
   Array<float> depth{};                   ///< [rows][columns] world units; infinity: no hit
   Array<std::array<float, 3>> normals{};  ///< [rows][columns] world space, of length 1, away from
                                           ///< larger values; 0 0 0: no hit
@@ -249,7 +254,7 @@ struct Frame {
   std::optional<DetailChoice> detail{};  ///< if max_surface_error was given
 };
 
-/// Writes frame.picture: RGB, or RGBA if a caller has added an alpha to its pixels.
+/// Writes frame.picture: RGB, or RGBA if it is transparent.
 ///
 /// Throws  Error: no picture, a name that does not end in .png, a file that cannot be written
 void save_png(const Frame &frame, const std::filesystem::path &path);
