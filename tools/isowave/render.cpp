@@ -201,7 +201,8 @@ struct FrameOfMany {
 };
 
 Image8 image_of(const isowave::ImageSize &size, const isowave::Array<std::uint8_t> &picture) {
-  return {size.width, size.height, 3, picture.to_vector()};
+  const std::size_t num_pixels = std::size_t{size.width} * size.height;
+  return {size.width, size.height, picture.size() == 4 * num_pixels ? 4u : 3u, picture.to_vector()};
 }
 
 /// With --progress-dir, the picture after every pass is written.
@@ -449,6 +450,7 @@ void run_render(const CLI::App &command, RenderArgs options) {
   check_options(command, options, drawing.team);
   drawing.appearance.surface = parse_color("--color", options.color);
   drawing.appearance.background = parse_color("--background", options.background);
+  drawing.appearance.transparent = options.transparent;
   set_wanted(options);
   set_up(command, options, drawing);
   if (options.verbose && drawing.on_device != nullptr)

@@ -112,9 +112,11 @@ void check_options(const CLI::App &command, const RenderArgs &options, const Tea
   if (options.reference && !options.progress_dir.empty())
     throw Error("--reference has no passes: leave out --progress-dir");
   if (!asks_for_picture(options)) {
-    refuse_options(command, {"--color", "--background", "--normals", "--ambient"},
+    refuse_options(command, {"--color", "--background", "--transparent", "--normals", "--ambient"},
                    "no picture is written: give --output");
   }
+  if (options.transparent)
+    refuse_options(command, {"--background"}, "pictures with --transparent have none");
   if (options.stats.empty())
     refuse_options(command, {"--no-stage-times"}, "no statistics are written: give --stats");
   check_renderer_options(command, options.renderer_flags);
@@ -184,7 +186,8 @@ namespace {
 void group_render_options(CLI::App &command) {
   group_options(command, "Options of every day",
                 {"--help", "--isovalue", "--output", "--size", "--samples", "--orbit", "--cameras",
-                 "--parallel", "--color", "--background", "--normals", "--ambient", "--device"});
+                 "--parallel", "--color", "--background", "--transparent", "--normals", "--ambient",
+                 "--device"});
   group_options(command, "Clipping", {"--clip", "--clip-box", "--no-caps"});
   group_volume_options(command);
   group_compression_options(command);
@@ -231,6 +234,9 @@ void add_render_options(CLI::App &command, RenderArgs &options) {
   command.add_option("--color", options.color, "surface colour #RRGGBB")->capture_default_str();
   command.add_option("--background", options.background, "background colour #RRGGBB")
       ->capture_default_str();
+  command.add_flag("--transparent", options.transparent,
+                   "RGBA pictures instead of a background: alpha is the share of a pixel's rays "
+                   "that hit, and the colour is theirs (straight alpha)");
   add_normals_option(command, options.normals);
   add_ambient_option(command, options.ambient_rays);
   add_clip_options(command, options.clip_options);

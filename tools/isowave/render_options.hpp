@@ -27,7 +27,8 @@ struct RenderArgs {
   std::string device;
   RendererFlags renderer_flags;
   RendererOptions renderer;  ///< what the flags ask for
-  bool reference = false, no_stage_times = false, verbose = false, parallel = false;
+  bool reference = false, no_stage_times = false, verbose = false, parallel = false,
+       transparent = false;
   std::string color = "#DBBD87", background = "#FFFFFF";
   std::string image, depth, stats, progress_dir, error_map, refined;
   std::optional<double> max_surface_error;  ///< pixels

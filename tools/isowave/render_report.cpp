@@ -163,6 +163,7 @@ nlohmann::ordered_json options_json(const RenderArgs &options, ImageSize size,
   json["voxel_pixels"] = options.voxel_pixels;
   json["normals"] = options.normals;
   json["ambient"] = options.ambient_rays;
+  json["transparent"] = options.transparent;
   json["clip"] = clip_json(options.clip);
   return json;
 }
