@@ -30,6 +30,13 @@ nb::tuple camera_tuple(const isowave::Camera &camera) {
                         camera.fovy_degrees);
 }
 
+/// [height][width][3], or [4] if it is transparent.
+nb::object picture_array(isowave::Array<std::uint8_t> &&pixels, const isowave::ImageSize &size) {
+  const std::size_t opaque = std::size_t{3} * size.width * size.height;
+  const std::size_t channels = pixels.size() > opaque ? 4 : 3;
+  return to_numpy<std::uint8_t>(std::move(pixels), {size.height, size.width, channels});
+}
+
 /// The picture so far; only while the callback that got it is at work. Threads take turns.
 class PassView {
   /// A thread with the lock never waits for the GIL.
@@ -56,7 +63,7 @@ class PassView {
       size = progress.size();
       return progress.picture();
     });
-    return to_numpy<std::uint8_t>(std::move(pixels), {size.height, size.width, 3});
+    return picture_array(std::move(pixels), size);
   }
   /// The callback is over. Waits for pictures of other threads.
   void end() {
@@ -109,10 +116,8 @@ void add_hits(const isowave::Frame &frame, nb::dict &result) {
 nb::dict frame_dict(isowave::Frame &&frame, bool is_of_rays = false) {
   nb::dict result;
   const std::size_t rows = frame.rows, columns = frame.columns;
-  if (!frame.picture.empty()) {
-    result["picture"] =
-        to_numpy<std::uint8_t>(std::move(frame.picture), {frame.size.height, frame.size.width, 3});
-  }
+  if (!frame.picture.empty())
+    result["picture"] = picture_array(std::move(frame.picture), frame.size);
   if (is_of_rays || !frame.depth.empty())
     result["depth"] = to_numpy<float>(std::move(frame.depth), {rows, columns});
   if (is_of_rays || !frame.normals.empty())

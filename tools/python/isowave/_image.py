@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from isowave import _core
 from isowave._checked import flag
-from isowave._request import Request
+from isowave._request import Request, rgb_of
 
 WHITE = (1.0, 1.0, 1.0)  # the background if none is given, as isowave::Appearance has it
 
@@ -22,7 +22,6 @@ class Image:
     have `samples` times as many rows and columns: one entry for each ray.
     """
 
-    rgb: npt.NDArray[np.uint8] | None  #: (height, width, 3)
     depth: npt.NDArray[np.float32] | None  #: distance from the eye [world units]; inf: no surface
     normals: npt.NDArray[np.float32] | None
     """(rows, columns, 3), (x, y, z) in world space, of length 1, away from larger values; 0
@@ -37,7 +36,8 @@ class Image:
 
     def __init__(self, frame: dict[str, Any], request: Request) -> None:
         assert request.camera is not None
-        self.rgb = frame.get("picture")
+        # (height, width, 3), or 4 if it is transparent
+        self._picture: npt.NDArray[np.uint8] | None = frame.get("picture")
         self.depth = frame.get("depth")
         self.normals = frame.get("normals")
         self.position = frame.get("positions")
@@ -55,12 +55,20 @@ class Image:
         return bool(self.statistics["complete"])
 
     @property
+    def rgb(self) -> npt.NDArray[np.uint8] | None:
+        """(height, width, 3). Raises ValueError if the picture is transparent: see rgba."""
+        return None if self._picture is None else rgb_of(self._picture)
+
+    @property
     def rgba(self) -> npt.NDArray[np.uint8]:
         """(height, width, 4); alpha is the part of a pixel that the surface covers.
 
-        Colours are the surface's, without the background. Without depth, all pixels are opaque.
+        Colours are the surface's, without the background. A transparent picture has been drawn
+        like this. Others become so if they have depth; without depth, all pixels are opaque.
         """
-        rgb = self._rgb()
+        rgb = self._drawn()
+        if rgb.shape[2] == 4:
+            return rgb
         if self.depth is None:
             return np.dstack((rgb, np.full(rgb.shape[:2], 255, np.uint8)))
         s = self._samples
@@ -74,10 +82,10 @@ class Image:
             rgb[edge] = np.rint(surface.clip(0, 255))
         return np.dstack((rgb, np.rint(255 * covered).astype(np.uint8)))
 
-    def _rgb(self) -> npt.NDArray[np.uint8]:
-        if self.rgb is None:
+    def _drawn(self) -> npt.NDArray[np.uint8]:
+        if self._picture is None:
             raise ValueError("the picture was not asked for: render(..., outputs=('rgb', ...))")
-        return self.rgb
+        return self._picture
 
     def __array__(
         self, dtype: npt.DTypeLike | None = None, copy: bool | None = None
@@ -85,15 +93,18 @@ class Image:
         return np.asarray(self.rgba, dtype)
 
     def _repr_png_(self) -> bytes:
-        return _core.encode_png(self._rgb())
+        return _core.encode_png(self._drawn())
 
     def save(self, path: str | os.PathLike[str], *, alpha: bool = False) -> None:
         """Writes a .png file, whole or not at all.
 
-        alpha: writes `rgba` instead of `rgb`; pixels without surface are transparent.
+        alpha: writes `rgba`; pixels without surface are transparent. Otherwise the picture is
+        written as it was drawn.
         """
-        _core.save_png(self.rgba if flag("alpha", alpha) else self._rgb(), os.fsdecode(path))
+        _core.save_png(self.rgba if flag("alpha", alpha) else self._drawn(), os.fsdecode(path))
 
     def __repr__(self) -> str:
-        shown = "" if self.rgb is None else f"{self.rgb.shape[1]} x {self.rgb.shape[0]}, "
+        shown = ""
+        if self._picture is not None:
+            shown = f"{self._picture.shape[1]} x {self._picture.shape[0]}, "
         return f"<isowave.Image {shown}isovalue {self.isovalue:g}>"

@@ -191,6 +191,7 @@ class Renderer:
         samples: int = 1,
         color: Color | None = None,
         background: Color | None = None,
+        transparent: bool = False,
         normals: str = "smooth",
         clip: Sequence[ClipPlane] = (),
         caps: bool = True,
@@ -219,6 +220,9 @@ class Renderer:
             Rays per pixel along each axis, 1 to 8; colours are their mean.
         color, background
             Colours of the surface and behind it: "#rrggbb", or red, green, blue from 0 to 1.
+        transparent
+            Draws `rgba` instead of `rgb`, without a background. Alpha is the share of a pixel's
+            rays that hit, and the colour is theirs (straight alpha).
         normals
             "smooth": central differences; "cell": gradients of cells, which jump between them.
         clip
@@ -312,8 +316,8 @@ class Renderer:
     def passes(self, isovalue: Isovalue, **more: Any) -> Iterator[Image]:
         """Yields the picture after each pass, and the finished one last; arguments as render().
 
-        Pictures before the last have only rgb. The frame waits until the next picture is asked for,
-        and ends when the iterator is closed.
+        Pictures before the last have only rgb, or rgba. The frame waits until the next picture is
+        asked for, and ends when the iterator is closed.
         """
         pictures: queue.Queue[Image | BaseException | None] = queue.Queue(maxsize=1)
         closed = threading.Event()
@@ -331,7 +335,8 @@ class Renderer:
                 return True  # the finished picture follows
             statistics: dict[str, Any] = {"passes": progress.passes, "complete": False}
             statistics["completed_percent"] = progress.completed_percent
-            put(Image({"picture": progress.rgb, "statistics": statistics}, request))
+            picture = progress.rgba if request.transparent else progress.rgb
+            put(Image({"picture": picture, "statistics": statistics}, request))
             return not closed.is_set() and not _core.is_ending()
 
         def draw() -> None:

@@ -20,6 +20,13 @@ ALL_OUTPUTS = ("rgb", "depth", "normals", "position")
 KNOWN_OUTPUTS = (*ALL_OUTPUTS, "bounds")
 
 
+def rgb_of(picture: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
+    """The picture itself. Raises ValueError if it is transparent."""
+    if picture.shape[2] == 4:
+        raise ValueError("a transparent picture has no rgb: take rgba")
+    return picture
+
+
 class Progress:
     """The picture so far, for on_pass, and only until on_pass returns."""
 
@@ -38,7 +45,15 @@ class Progress:
     @property
     def rgb(self) -> npt.NDArray[np.uint8]:
         """(height, width, 3), drawn when it is asked for; smaller at first with a time budget."""
-        return self._view.picture()
+        return rgb_of(self._view.picture())
+
+    @property
+    def rgba(self) -> npt.NDArray[np.uint8]:
+        """(height, width, 4), as rgb, if the picture is transparent."""
+        picture = self._view.picture()
+        if picture.shape[2] == 3:
+            raise ValueError("the picture has no alpha: render(..., transparent=True)")
+        return picture
 
 
 @dataclass(frozen=True)
@@ -58,6 +73,7 @@ class Request:
     samples: int = 1
     color: Color | None = None
     background: Color | None = None
+    transparent: bool = False
     normals: str = "smooth"
     clip: Sequence[ClipPlane] = ()
     caps: bool = True
@@ -84,6 +100,7 @@ class Request:
             "samples": whole("samples", self.samples),
             "color": None if self.color is None else color_of(self.color),
             "background": None if self.background is None else color_of(self.background),
+            "transparent": flag("transparent", self.transparent),
             "normals": normals_of(self.normals),
             "clip": clip_of(self.clip),
             "caps": flag("caps", self.caps),
@@ -97,6 +114,8 @@ class Request:
             "ambient": whole("ambient", self.ambient),
             "on_pass": function("on_pass", self.on_pass),
         }
+        if self.transparent and self.background is not None:
+            raise ValueError("background: a transparent picture has none")
         for name, value in checked.items():
             object.__setattr__(self, name, value)
 
@@ -127,6 +146,7 @@ class Request:
             "samples": self.samples,
             "surface": self.color,
             "background": self.background,
+            "transparent": self.transparent,
             "normals": self.normals,
             "clip": [{"normal": plane.normal, "offset": plane.offset} for plane in self.clip],
             "caps": self.caps,

@@ -27,6 +27,10 @@ renderer = isowave.BrickRenderer(fuel, comm, size=(96, 64), samples=2, rays=True
 keep("plain", renderer.render(40))
 keep("samples", renderer.render(40, samples=2, size=(48, 32), normals="cell"))
 keep("ambient", renderer.render(40, ambient=3, color="#3070b0"))
+for samples in (1, 2):
+    image = renderer.render(40, size=(48, 32), samples=samples, transparent=True)
+    if image is not None:
+        pictures[f"rgba{samples}"] = image.rgba
 camera = isowave.Camera.orbit(renderer, 3)[1]
 keep("orbit", renderer.render(90, camera=camera, outputs=("rgb", "depth")))
 keep("depth", renderer.render(90, outputs=("depth",)))
@@ -60,6 +64,7 @@ fails("auto", lambda: renderer.render("auto"))
 fails("auto camera", lambda: renderer.camera("auto"))
 fails("camera", lambda: renderer.render(40, camera=camera if rank == 1 else None))
 fails("color", lambda: renderer.render(40, color="blue" if rank == 1 else None))
+fails("transparent", lambda: renderer.render(40, transparent=rank == 1))
 fails("outputs", lambda: renderer.render(40, outputs=("position",)))
 fails("time", lambda: renderer.render(40, time_budget=1.0))
 fails("max_error", lambda: renderer.render(40, max_error=1.0))

@@ -65,6 +65,9 @@ def test_the_bits_of_one_process(drawn):
     expect(pictures, "samples", samples)
     ambient = renderer.render(40, ambient=3, color="#3070b0", outputs=outputs)
     expect(pictures, "ambient", ambient)
+    for samples in (1, 2):
+        image = renderer.render(40, size=(48, 32), samples=samples, transparent=True)
+        np.testing.assert_array_equal(pictures[f"rgba{samples}"], image.rgba)
     camera = isowave.Camera.orbit(volume, 3)[1]
     expect(pictures, "orbit", renderer.render(90, camera=camera, outputs=("rgb", "depth")))
     expect(pictures, "depth", renderer.render(90, outputs=("depth",)))
@@ -98,6 +101,7 @@ def test_bounds_of_the_error(drawn, levelled):
         ("auto camera", "isovalue='auto': no process sees the whole volume: give a number"),
         ("camera", "some processes give a camera"),
         ("color", "color 'blue': give '#rrggbb'"),
+        ("transparent", "rank 1 has another request than rank 0"),
         ("outputs", "outputs position: bricks have rgb, depth, normals, bounds"),
         ("time", "a BrickRenderer draws without time_budget"),
         ("max_error", "made with_bounds"),
