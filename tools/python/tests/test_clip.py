@@ -26,7 +26,7 @@ OBLIQUE = ClipPlane.through(MIDDLE + (1, 0, 0), (1, -2, -3))
 def ball() -> isowave.Volume:
     """Values fall with the distance from MIDDLE; RADIUS is the isovalue 0."""
     return isowave.compress(
-        RADIUS - sphere_voxels((25, 24, 31)), exact=True, origin=(30, 20, 10), spacing=(1, 1, 1)
+        RADIUS - sphere_voxels((25, 24, 31)), exact=True, levels=2, origin=(30, 20, 10)
     )
 
 
