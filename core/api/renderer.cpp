@@ -4,6 +4,7 @@
 #include <mutex>
 #include <utility>
 
+#include "core/api/convert.hpp"
 #include "core/api/frame_parts.hpp"
 #include "core/api/guarded.hpp"
 #include "core/api/renderer_implementation.hpp"
