@@ -129,14 +129,10 @@ void judge_all(const std::vector<FrameJudge> &judges, const FrameParams &frame, 
 }
 
 /// A clipped frame before its oracle: a row and an entry.
-///
-/// voxels  of the volume: one array
-void judge_clipped_frame(const Scene &scene, std::size_t view, const Clip &clip,
-                         const FrameParams &frame, std::span<const std::vector<float>> voxels,
+void judge_clipped_frame(const ClipOracle &oracle, const FrameParams &frame, std::size_t view,
                          std::span<const HitRecord> hits, const ordered_json &labels,
                          ordered_json &document, Totals &totals) {
   const auto begin = Clock::now();
-  const ClipOracle oracle(scene.volume.info, scene.cameras[view], clip, {&frame, 1}, voxels);
   const ClipAccuracy tally = judge_clipped(oracle, hits);
   print_clip_accuracy(fmt::format("clip, isovalue {}, view {}", frame.surface.isovalue, view),
                       tally);
@@ -195,10 +191,13 @@ std::uint64_t verify_frames(const VerifyFramesOptions &options,
                                  .voxel_error = options.frame.voxel_error,
                                  .normals = Normals::kCell});
         const std::vector<HitRecord> hits = drawer.renderer->hits();
-        if (clip.planes.empty())
+        if (clip.planes.empty()) {
           judge_all(judges, frame, view, hits, labels, document, totals);
-        else
-          judge_clipped_frame(scene, view, clip, frame, voxels, hits, labels, document, totals);
+        } else {
+          const ClipOracle oracle(scene.volume.info, scene.cameras[view], clip, {&frame, 1},
+                                  voxels);
+          judge_clipped_frame(oracle, frame, view, hits, labels, document, totals);
+        }
         const Quantiles rounding =
             quantiles(ray_rounding(scene.volume.info, scene.cameras[view], scene.size, hits));
         fmt::print(
