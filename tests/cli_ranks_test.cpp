@@ -186,8 +186,7 @@ TEST_F(CliRanks, SamplesLevelsAndBricksAsAskedFor) {
 
 /// A plane through the middle of the whole, not of a brick; a cap that belongs to several bricks.
 TEST_F(CliRanks, ClippingPlanes) {
-  expect_same(convert("--exact --levels 3"),
-              "-i 20 --size 96x64 --voxel-pixels 1.5 --clip 1,1,-0.5 --ambient 2", 3);
+  expect_same(convert("--exact"), "-i 20 --size 96x64 --clip 1,1,-0.5", 2);
 }
 
 TEST_F(CliRanks, AmbientRays) {
