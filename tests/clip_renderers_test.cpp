@@ -23,7 +23,6 @@
 namespace isowave::core {
 namespace {
 
-using test::camera_along;
 using test::expect_same_hits;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
