@@ -50,8 +50,8 @@ std::vector<Camera> cameras_beside(const Camera &camera, std::uint32_t height, d
 /// all of these hits or farther. So silhouettes may move by `limit`, too. Does not set `lowest`.
 SampledShare compare_hits(const Camera &camera, ImageSize size, std::span<const SeenFrame> finest,
                           std::span<const SeenFrame> other, double limit);
-/// A hit's tangent plane counts up to so many times the error away from the hit. A judgement: a
-/// surface that rays graze is as far along the ray.
+/// Largest distance from a hit at which its tangent plane stands for the surface [errors]. A
+/// judgement, not measured.
 inline constexpr double kGrazing = 16;
 
 /// Lower end of the one-sided Clopper-Pearson interval, of confidence kConfidence, for the share of

@@ -81,7 +81,7 @@ std::size_t set_half_colors(std::span<const std::uint64_t> words, std::size_t be
   };
   std::uint8_t *to = picture.data() + channels * begin;
   std::size_t num_hits = 0;
-  // Four pixels of RGB at once are 12 bytes, of which compilers make two stores.
+  // Compilers write four pixels of RGB, 12 bytes, by two stores.
   const std::uint8_t *end = picture.data() + picture.size();
   for (; channels == 3 && words.size() >= 2 && end - to >= 12; words = words.subspan(2), to += 12) {
     const std::uint64_t head =

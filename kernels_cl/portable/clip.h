@@ -13,7 +13,7 @@
 
 ISO_NAMESPACE_BEGIN
 
-/// The rays's distance from a plane as an axis. See make_ray().
+/// A ray's distance from a plane, as an axis of the ray. u, v, length: see RayOfView.
 ISO_INLINE RayAxis make_plane_axis(const View *view, ISO_GLOBAL const ClipParams *clip,
                                    ISO_GLOBAL const PlaneParams *plane, float u, float v,
                                    float length) {
@@ -60,7 +60,7 @@ ISO_INLINE uint side_where_cut(ISO_GLOBAL const ClipParams *clip, const Ray *ray
   return begins_at_cap(clip, ray) ? ISO_SIDE_OUTSIDE : ISO_SIDE_UNKNOWN;
 }
 
-/// Makes a hit where a clipped ray begins one of a cap.
+/// Gives a hit at the beginning of a clipped ray the mark and the gradient of a cap.
 ISO_INLINE void cap_hit(ISO_GLOBAL const ClipParams *clip, const Ray *ray, HitRecord *hit) {
   ISO_GLOBAL const PlaneParams *plane = &clip->planes[ray->cut_by];
   hit->cell |= ISO_CAP;
