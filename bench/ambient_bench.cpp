@@ -12,10 +12,10 @@ struct AmbientInput : RaysRig {
       : RaysRig(device, width), ambient(device, rays.num_rays) {
     rays.given = {device, "given rays", rays.num_rays};
     rays.given_hits = {device, "hits of given rays", rays.num_rays};
-    rays.open_counts = {device, "open ambient rays", rays.num_rays};
+    rays.open_counts = {device, "open ambient rays", 2 * rays.num_rays};
     VolumeInfo info;
     info.dims = {params.grid.dims_x, params.grid.dims_y, params.grid.dims_z};
-    ambient.begin(info, 0, 2);
+    ambient.begin(info, 0, {.num_ambient = 2});
     ambient(rays, 0);
     rays.given_hits.copy(rays.hits, rays.num_rays);  // all closed
     ambient(rays, 1);

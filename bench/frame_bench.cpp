@@ -12,13 +12,18 @@
 #include "bench/budget_sweep.hpp"
 #include "bench/frame_report.hpp"
 #include "bench/run_info.hpp"
+#include "core/api/frame_parts.hpp"
 #include "core/base/error.hpp"
 #include "core/render/device_renderer.hpp"
+#include "core/view/color_maps.hpp"
+#include "tools/isowave/clip_options.hpp"
 #include "tools/isowave/outputs.hpp"
 #include "tools/isowave/program.hpp"
 #include "tools/isowave/render_stats.hpp"
 #include "tools/isowave/renderer_options.hpp"
+#include "tools/isowave/slice_options.hpp"
 #include "tools/isowave/strict_options.hpp"
+#include "tools/isowave/surface_options.hpp"
 #include "tools/isowave/volume_options.hpp"
 
 namespace isowave::core::bench {
@@ -37,6 +42,12 @@ struct Options {
   std::string normals = "cell";
   std::uint32_t ambient_rays = 0;
   bool depth = false;
+  tools::ClipOptions clip;
+  tools::SliceOptions slices;
+  std::uint32_t surfaces = 0;
+  float opacity = 0.3f;
+  tools::LightOptions light;
+  std::string field;
   tools::RendererFlags renderer;
 };
 
@@ -49,11 +60,24 @@ float isovalue_of(const Options &options, const CompressedVolume &volume) {
   return middle;
 }
 
+/// The surfaces of --surfaces, around the isovalue.
+std::vector<SurfaceStyle> surfaces_of(const Options &options, const CompressedVolume &volume) {
+  const float step = (volume.value_range[1] - volume.value_range[0]) / 16;
+  std::vector<SurfaceStyle> surfaces;
+  for (std::uint32_t i = 0; i < options.surfaces; ++i) {
+    const float place = static_cast<float>(i) - 0.5f * static_cast<float>(options.surfaces - 1);
+    surfaces.push_back(
+        {.isovalue = isovalue_of(options, volume) + step * place, .opacity = options.opacity});
+  }
+  return surfaces;
+}
+
 /// On a device of its own, so that the memory reported is that of drawing.
-CompressedVolume load(const Options &options, const ocl::DeviceInfo &device_info) {
+CompressedVolume load(const std::string &name, const Options &options,
+                      const ocl::DeviceInfo &device_info) {
   ocl::Device device(device_info);
-  return tools::load_volume(options.volume, tools::to_overrides(options.volume_options),
-                            options.compression, &device);
+  return tools::load_volume(name, tools::to_overrides(options.volume_options), options.compression,
+                            &device);
 }
 
 /// Stage -> ms of a cold frame, for each view.
@@ -70,7 +94,7 @@ std::vector<std::map<std::string, double>> measure_stages(ocl::Device &device,
     for (const PassStats &pass : frame.passes) {
       for (const auto &[stage, ms] : pass.stage_ms) views[view][stage] += ms;
     }
-    for (const LaterPasses *later : {&frame.normals, &frame.ambient}) {
+    for (const LaterPasses *later : {&frame.normals, &frame.behind, &frame.field, &frame.ambient}) {
       for (const auto &[stage, ms] : later->stage_ms) views[view][stage] += ms;
     }
   }
@@ -91,8 +115,21 @@ FrameReport make_report(const Options &options, const CompressedVolume &volume,
   report.options = tools::to_renderer_options(
       options.renderer, {options.size.at(0), options.size.at(1), options.samples});
   report.ambient_rays = options.ambient_rays;
+  report.clip = tools::read_clip(options.clip, volume.info);
+  report.surfaces = surfaces_of(options, volume);
+  isowave::Appearance slice_colors;
+  const auto slices = tools::read_slices(options.slices, volume.info, slice_colors);
+  report.slices = core_slices(slices, slice_colors, volume.value_range);
+  if (!slices.empty() && report.surfaces.empty()) report.surfaces = {{.isovalue = report.isovalue}};
+  report.options.max_surfaces = static_cast<std::uint32_t>(report.surfaces.size());
   report.wanted.depth = options.depth;
-  report.options.with_given_rays = options.ambient_rays != 0;
+  isowave::Appearance light;
+  tools::read_light(options.light, light);
+  report.light = core_appearance(light, volume.info);
+  report.shadow_rays = light.shadow_rays;
+  report.light_angle = light.light_angle;
+  if (!options.field.empty()) report.light.color_by_field = {.colors = color_map("viridis")};
+  report.options.with_given_rays = options.ambient_rays != 0 || light.shadow_rays != 0;
   report.num_views = options.orbit;
   report.rounds = options.rounds;
   return report;
@@ -100,9 +137,12 @@ FrameReport make_report(const Options &options, const CompressedVolume &volume,
 
 FrameReport measure(const Options &options, std::string command) {
   const ocl::DeviceInfo device_info = ocl::choose_device(options.device);
-  const CompressedVolume volume = load(options, device_info);
+  const CompressedVolume volume = load(options.volume, options, device_info);
+  CompressedVolume field;
+  if (!options.field.empty()) field = load(options.field, options, device_info);
   const std::vector<Camera> cameras = orbit_cameras(volume.info, options.orbit);
   FrameReport report = make_report(options, volume, std::move(command));
+  if (!options.field.empty()) report.options.field = &field;
   std::vector<HitRecord> first_hits;
   {
     ocl::Device device(device_info);
@@ -113,7 +153,10 @@ FrameReport measure(const Options &options, std::string command) {
     renderer.render(seen_from(cameras.front(), report.request()));
     FrameRequest of_cells = report.request();
     of_cells.normals = Normals::kCell;  // as the floor draws
-    of_cells.ambient_rays = 0;
+    of_cells.ambient_rays = of_cells.shadow_rays = 0;
+    of_cells.field_values = false;
+    of_cells.surfaces.clear();
+    of_cells.slices = {};
     renderer.render(seen_from(cameras.front(), of_cells));
     first_hits = renderer.hits();
     report.views =
@@ -159,7 +202,7 @@ std::vector<std::uint64_t> budgets_of(const Options &options, const ocl::DeviceI
 
 BudgetSweep measure_budgets(const Options &options, std::string command) {
   const ocl::DeviceInfo device_info = ocl::choose_device(options.device);
-  const CompressedVolume volume = load(options, device_info);
+  const CompressedVolume volume = load(options.volume, options, device_info);
   FrameReport common = make_report(options, volume, std::move(command));
   std::vector<std::uint64_t> budgets = budgets_of(options, device_info, volume, common.options);
   return sweep_budgets(device_info, volume, std::move(common), std::move(budgets),
@@ -171,6 +214,8 @@ void check_options(const CLI::App &app, const Options &options) {
   tools::check_renderer_options(app, options.renderer);
   check_image_size({options.size.at(0), options.size.at(1), options.samples});
   if (options.budgets.empty()) tools::refuse_options(app, {"--max-passes"}, "is of --budgets");
+  if (options.light.shadow_rays != 0 && options.surfaces != 0)
+    throw Error("--shadow: --surfaces are drawn without it");
   tools::Outputs outputs;
   outputs.read_volume(options.volume);
   outputs.write("--json", options.json);
@@ -228,6 +273,21 @@ void add_options(CLI::App &app, Options &options) {
       "pictures must be the same");
   tools::add_normals_option(app, options.normals);
   tools::add_ambient_option(app, options.ambient_rays);
+  tools::add_clip_options(app, options.clip);
+  tools::add_slice_options(app, options.slices);
+  app.add_option(
+         "--surfaces", options.surfaces,
+         "number of surfaces in layers, a sixteenth of the range of values apart [one opaque "
+         "surface]")
+      ->check(CLI::Range(0, ISO_MAX_SURFACES))
+      ->excludes("--ambient", "--voxel-pixels");
+  app.add_option("--opacity", options.opacity, "opacity of --surfaces")
+      ->check(CLI::Range(0.01f, 1.0f))
+      ->capture_default_str();
+  tools::add_light_options(app, options.light);
+  app.add_option("--values-of", options.field,
+                 "second volume, whose values at the hits colour the surface")
+      ->excludes("--surfaces", "--budgets");
   app.add_flag("--depth", options.depth, "bring the picture's depth to the host, too");
   app.add_option("--max-passes", options.max_passes,
                  "of --budgets: a budget at which a frame takes more is not timed")

@@ -37,7 +37,7 @@ std::vector<ViewTimes> measure_views(DeviceRenderer &renderer, const std::vector
   const auto draw = [&](const Camera &camera) {
     const auto begin = std::chrono::steady_clock::now();
     TimedFrame frame{renderer.render(seen_from(camera, request))};
-    arrays = renderer.fetch(wanted, {});
+    arrays = renderer.fetch(wanted, request.light);
     frame.arrays_ms = ms_since(begin);
     return frame;
   };

@@ -248,7 +248,13 @@ ordered_json options_json(const FrameReport &report) {
   json["voxel_pixels"] = report.voxel_pixels;
   json["normals"] = to_string(report.normals);
   json["ambient"] = report.ambient_rays;
+  json["shadow"] = report.shadow_rays;
+  json["slices"] = report.slices.planes.size();
+  json["has_field"] = report.light.color_by_field.has_value();
   json["depth"] = report.wanted.depth;
+  json["clipping_planes"] = report.clip.planes.size();
+  for (const SurfaceStyle &surface : report.surfaces)
+    json["surfaces"].push_back({surface.isovalue, surface.opacity});
   return json;
 }
 

@@ -22,6 +22,12 @@ struct FrameReport {
   double voxel_pixels = 0;
   Normals normals = Normals::kCell;
   std::uint32_t ambient_rays = 0;
+  Clip clip{};
+  std::vector<SurfaceStyle> surfaces{};
+  Slices slices{};
+  Appearance light{};
+  std::uint32_t shadow_rays = 0;
+  double light_angle = 3;
   WantedArrays wanted{.picture = true};
   RendererOptions options;
   std::uint32_t num_views = 0, rounds = 0;
@@ -37,9 +43,16 @@ struct FrameReport {
   /// The request of all frames, without the camera.
   FrameRequest request() const {
     return {.isovalue = isovalue,
+            .clip = clip,
+            .surfaces = surfaces,
+            .slices = slices,
+            .light = light,
             .voxel_pixels = voxel_pixels,
             .normals = normals,
-            .ambient_rays = ambient_rays};
+            .field_values = light.color_by_field.has_value(),
+            .ambient_rays = ambient_rays,
+            .shadow_rays = shadow_rays,
+            .light_angle = light_angle};
   }
 };
 

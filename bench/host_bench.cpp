@@ -1,8 +1,10 @@
 // host_bench: frames that are drawn without OpenCL (core/host), ray by ray and in packets of eight
 // rays, in turns in one process; and with nothing decoded before. Ends with an error where a bit of
-// a hit differs. With --voxel-pixels: frames of levels of detail.
+// a hit differs. With --voxel-pixels: frames of levels of detail. With --surfaces: frames of so
+// many translucent surfaces, beside that of the first of them alone, opaque.
 //
 //   host_bench VOLUME [--isovalues 40,80,120] [--views 3] [--rounds 5] [--voxel-pixels 0,1,2,4]
+//   host_bench VOLUME --isovalues 128,126,130 --surfaces 1,3
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -22,6 +24,7 @@
 #include "core/base/parallel_for.hpp"
 #include "core/host/host_blocks.hpp"
 #include "core/host/host_levels.hpp"
+#include "core/host/host_renderer.hpp"
 #include "core/view/camera.hpp"
 #include "core/view/detail.hpp"
 #include "core/view/frame.hpp"
@@ -39,6 +42,8 @@ struct Options {
   std::uint32_t views = 3, rounds = 5, threads = 0;
   std::vector<std::uint32_t> size = {1280, 720};
   std::vector<double> voxel_pixels;
+  std::vector<std::uint32_t> surfaces;
+  float opacity = 0.3f;
   tools::CompressionOptions compression{.rate = 4};
 };
 
@@ -226,6 +231,58 @@ void measure_levels(const Options &options) {
   if (num_differing != 0) throw Error("{} hits differ", num_differing);
 }
 
+/// Draws each view in turns: the first isovalue alone, and the numbers of isovalues in
+/// options.surfaces as layers.
+void measure_surfaces(const Options &options) {
+  const CompressedVolume volume = tools::load_volume(options.volume, {}, options.compression);
+  const std::vector<float> isovalues = isovalues_of(options, volume);
+  HostRenderer renderer(volume, {.num_threads = options.threads,
+                                 .largest = {options.size.at(0), options.size.at(1)}});
+  struct Way {
+    std::string name;
+    std::vector<SurfaceStyle> surfaces;
+    std::vector<double> times;
+    LayerStats layers;
+  };
+  std::vector<Way> ways = {{"1, plain", {}, {}, {}},
+                           {"1, opaque", {{.isovalue = isovalues[0]}}, {}, {}}};
+  for (const std::uint32_t number : options.surfaces) {
+    ways.push_back({fmt::format("{}, opacity {}", number, options.opacity), {}, {}, {}});
+    for (std::uint32_t i = 0; i < number; ++i)
+      ways.back().surfaces.push_back({.isovalue = isovalues.at(i), .opacity = options.opacity});
+  }
+  std::uint64_t num_rays = 0;
+  for (const Camera &camera : orbit_cameras(volume.info, options.views)) {
+    for (std::uint32_t round = 0; round <= options.rounds; ++round) {  // the first decodes
+      for (std::size_t i = 0; i < ways.size(); ++i) {
+        Way &way = ways[(i + round) % ways.size()];
+        FrameRequest request{.camera = camera, .isovalue = isovalues[0]};
+        request.surfaces = way.surfaces;
+        renderer.render(request);  // so that no time has that of selecting isovalues
+        FrameStats stats;
+        const double ms = milliseconds([&] {
+          stats = renderer.render(request);
+          renderer.fetch({.picture = true}, {});
+        });
+        if (round != 0) way.times.push_back(ms);
+        if (round == 0) way.layers.add(stats.layers);
+      }
+    }
+    num_rays += renderer.size().num_rays();
+  }
+  fmt::print("{}: {} x {} x {}, isovalues {}; {} threads; ms with pictures, medians\n",
+             options.volume, volume.info.dims.x, volume.info.dims.y, volume.info.dims.z,
+             fmt::join(isovalues, " "), thread_count(options.threads));
+  fmt::print("  {:<20}{:>10}{:>10}{:>10}{:>14}{:>10}\n", "surfaces", "ms", "ratio", "layers",
+             "hits per ray", "cut");
+  for (const Way &way : ways) {
+    fmt::print("  {:<20}{:>10.1f}{:>10.2f}{:>10}{:>14.2f}{:>10}\n", way.name, median(way.times),
+               median(way.times) / median(ways[0].times), way.layers.layers,
+               static_cast<double>(way.layers.hits) / static_cast<double>(num_rays),
+               way.layers.rays_cut);
+  }
+}
+
 }  // namespace
 
 }  // namespace isowave::core::bench
@@ -252,8 +309,19 @@ int main(int argc, char **argv) {
                  "draw levels of detail instead, with each of these largest distances between "
                  "voxels of a coarser level [pixels]")
       ->delimiter(',');
+  app.add_option("--surfaces", options.surfaces,
+                 "numbers of isovalues to draw as translucent surfaces, in turns")
+      ->check(CLI::Range(1u, static_cast<unsigned>(ISO_MAX_SURFACES)))
+      ->delimiter(',');
+  app.add_option("--opacity", options.opacity, "of translucent surfaces")->capture_default_str();
   app.callback([&] {
-    if (options.voxel_pixels.empty()) {
+    for (const std::uint32_t number : options.surfaces) {
+      if (number > 3 && number > options.isovalues.size())
+        throw Error("{} surfaces need as many isovalues: give --isovalues", number);
+    }
+    if (!options.surfaces.empty()) {
+      bench::measure_surfaces(options);
+    } else if (options.voxel_pixels.empty()) {
       bench::measure(options);
     } else {
       bench::measure_levels(options);

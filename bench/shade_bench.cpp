@@ -23,7 +23,7 @@ struct ShadeInput : FrameRig {
           "shaded pixels");
   }
   FrameArrays run(const WantedArrays &wanted = {.picture = true}) {
-    return shade(wanted, appearance, {}, rays, 1);
+    return shade(wanted, appearance, {}, rays, nullptr, 1);
   }
 
   ShadeParams appearance;

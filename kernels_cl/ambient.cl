@@ -1,5 +1,5 @@
-/// ambient.cl -- between the rounds of ambient rays: counts which rays of a round met nothing, and
-/// makes those of the next (portable/ambient.h).
+/// ambient.cl -- between the rounds of ambient and shadow rays: counts which rays of a round met
+/// nothing, and makes those of the next (portable/ambient.h).
 ///
 ///   [ smooth normals ] -> ambient -> [ pipeline `rays` on these rays -> ambient ]*
 #define ISO_FOUND local
@@ -25,8 +25,8 @@ ISO_INLINE int meets_clipped(const FrameParams *frame, global const ClipParams *
 /// round       0..num_rounds: the rays to make; num_rounds: none
 /// In      hits [pixel]: of the frame; given [pixel], given_hits [pixel]: the rays of the round
 ///         before, and what they met
-/// Out     open_counts [pixel]: rays of the rounds before that met nothing that is drawn, 0 without
-///         a hit; given [pixel]
+/// Out     open_counts [2][pixel]: ambient rays of the rounds before that met nothing that is
+///         drawn, 0 without a hit; and such shadow rays, if there are any; given [pixel]
 /// Launch  grid-stride over pixels
 kernel void ambient(const FrameParams frame_params, global const FrameParams *frames,
                     uint num_frames, global const ClipParams *clip, uint first_level,
@@ -35,22 +35,25 @@ kernel void ambient(const FrameParams frame_params, global const FrameParams *fr
                     global const HitRecord *given_hits, global GivenRay *given,
                     global uchar *open_counts) {
   const FrameParams *frame = &frame_params;
-  for (uint pixel = get_global_id(0); pixel < frame->view.width * frame->view.height;
-       pixel += get_global_size(0)) {
+  const uint num_pixels = frame->view.width * frame->view.height;
+  const int counts_lit = round != 0 && is_shadow_ray(&params, round - 1);
+  for (uint pixel = get_global_id(0); pixel < num_pixels; pixel += get_global_size(0)) {
     const HitRecord hit = hits[pixel];
+    if (round == 0) {
+      open_counts[pixel] = 0;
+      if (params.num_ambient != num_rounds) open_counts[num_pixels + pixel] = 0;
+    }
     if (hit.t == INFINITY) {
       given[pixel] = no_ray();
-      open_counts[pixel] = 0;
       continue;
     }
-    uint num_open = 0;
-    if (round != 0) {
+    if (round != 0 && is_given(given[pixel])) {
       const int meets = given_hits[pixel].t != INFINITY &&
                         (clip->num_planes == 0 ||
                          !meets_clipped(frame, clip, first_level, given[pixel], given_hits[pixel]));
-      num_open = open_counts[pixel] + !meets;
+      const uint place = counts_lit ? num_pixels + pixel : pixel;
+      open_counts[place] = (uchar)(open_counts[place] + !meets);
     }
-    open_counts[pixel] = (uchar)num_open;
     if (round == num_rounds) continue;
     HitRecord placed = hit;
     if (!ISO_PLACED_HITS) {
@@ -58,7 +61,7 @@ kernel void ambient(const FrameParams frame_params, global const FrameParams *fr
       placed = placed_hit(level, ISO_LEVELS ? level_of(frames, num_frames, hit.block_id) : 0u, hit);
     }
     given[pixel] =
-        ambient_ray(frame, &params, placed, pixel,
+        ambient_ray(frame, &params, placed, pixel, round,
                     directions[round * ISO_AMBIENT_PATTERNS + ambient_pattern(frame, pixel)]);
   }
 }

@@ -16,6 +16,7 @@
 typedef struct RayMarch {
   RayEntry entry;
   RayStand stand;
+  uint hit_cell;  ///< HitRecord::cell of the ray's last hit, if it stands there
   uint lane, lanes;
   uint next;           ///< the block that the next round begins with; ISO_INVALID_ID: none is left
   local uint *blocks;  ///< [num_blocks] of the round, ISO_GROUP_SIZE apart
@@ -30,11 +31,13 @@ typedef struct RayMarch {
 } RayMarch;
 
 ISO_INLINE RayMarch begin_march(global const uint *active_ray_ids, global const uint *ray_block_ids,
-                                uint num_rays, uint i, uint lane, uint lanes) {
+                                global const HitRecord *hits, uint num_rays, uint i, uint lane,
+                                uint lanes) {
   const int is_ray = i < num_rays;
   RayMarch m;
   m.entry = unpack_entry(is_ray ? active_ray_ids[i] : 0);
   m.stand = read_stand(is_ray ? ray_block_ids[m.entry.pixel] : ISO_INVALID_ID);
+  m.hit_cell = ISO_BEHIND_HITS && is_ray ? hits[m.entry.pixel].cell : 0u;
   m.lane = lane;
   m.lanes = lanes;
   m.next = m.stand.block_id;
@@ -68,7 +71,8 @@ ISO_INLINE void walk_round(const FrameParams *level, const CacheReader *cache, c
     const int may_end = m->next == ISO_INVALID_ID && at + 1 == m->num_blocks;
     m->result = march_block(level, cache, ray, last, block_coords(level, block_id),
                             stands_here && m->entry.in_doubt != 0,
-                            stands_here ? m->stand.side : ISO_SIDE_UNKNOWN, may_end, &m->change);
+                            stands_here ? m->stand.side : ISO_SIDE_UNKNOWN, m->hit_cell, may_end,
+                            &m->change);
     if (m->result == ISO_RAY_LEFT) {
       ++m->num_passed;
     } else {
@@ -106,6 +110,11 @@ ISO_INLINE int leave(const RayMarch *m, uint behind, global uint *ray_block_ids,
   }
   *entry = pack_entry(m->entry.pixel, log_ahead, m->result == ISO_RAY_DOUBT ? 1u : 0u);
   return waits || crosses;
+}
+
+/// Does the ray end in this lane, without a hit? In frames of one level of detail.
+ISO_INLINE int ends_without_hit(const RayMarch *m) {
+  return (m->is_gone && m->lane == 0) || m->result == ISO_RAY_ENDS;
 }
 
 /// Walks rays on until they hit, leave or wait. A ray that leaves the band of its level waits
@@ -155,7 +164,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
   barrier(CLK_LOCAL_MEM_FENCE);
   for (uint begin = get_global_id(0) - item; begin < num_rays * lanes;
        begin += parts * get_global_size(0)) {
-    RayMarch m = begin_march(active_ray_ids, ray_block_ids, num_rays, (begin + item) / lanes,
+    RayMarch m = begin_march(active_ray_ids, ray_block_ids, hits, num_rays, (begin + item) / lanes,
                              item % lanes, lanes);
     const uint pixel = m.entry.pixel;
     ISO_FRAME_OF(level, m.stand.block_id);
@@ -187,6 +196,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
       ++num_hits;
       ++num_blocks;
     }
+    if (ISO_BEHIND_HITS && ends_without_hit(&m)) hits[pixel] = no_hit();
     uint behind = ISO_INVALID_ID, entry;
     if (leaves_band(m.result, m.is_gone && m.lane == 0)) {
       behind = cross_borders(frames, num_frames, clip, macrocell_masks, ranges, no_data,

@@ -1,36 +1,32 @@
 /// shade.cl -- hit buffer -> the arrays that users get: colours, distances, normals. Never changes
 /// which hit was chosen.
+#include "device/store_pixels.h"
 #include "portable/shade.h"
 
-#define PIXELS 4u /* of a work-item: RGB of four pixels are three words */
-
-/// In      hits [height * width]; open_counts, num_ambient: see shade_pixel()
-/// Out     bytes: RGBA [height / samples][width / samples][4] if with_alpha is not 0, else RGB
-///         [3]; 8 bits each. Pixels are rounded up to a multiple of four; those beyond the picture
-///         are 0.
+/// In      color_map [ISO_MAP_COLORS]; hits [height * width]; open_counts, num_ambient,
+///         num_shadow, field_values: see shade_pixel()
+/// Out     bytes: RGBA [height / samples][width / samples][4] if with_alpha is not 0, else RGB [3];
+///         8 bits each. Pixels are rounded up to a multiple of four, by pixels of 0
 /// Launch  grid-stride over four pixels
-kernel void shade(const FrameParams frame_params, const ShadeParams shade_params, uint samples,
-                  global const HitRecord *hits, global const uchar *open_counts, uint num_ambient,
-                  uint with_alpha, global void *bytes) {
+kernel void shade(const FrameParams frame_params, const ShadeParams shade_params,
+                  global const uint *color_map, uint samples, global const HitRecord *hits,
+                  global const uchar *open_counts, uint num_ambient, uint num_shadow,
+                  global const float *field_values, uint with_alpha, global void *bytes) {
   global uint *image = (global uint *)bytes;
   const FrameParams *frame = &frame_params;
   const uint columns = frame->view.width / samples, rows = frame->view.height / samples;
-  const uint num_pixels = columns * rows, num_items = (num_pixels + PIXELS - 1) / PIXELS;
+  const uint num_pixels = columns * rows,
+             num_items = (num_pixels + ISO_PIXELS_OF_ITEM - 1) / ISO_PIXELS_OF_ITEM;
   for (uint item = get_global_id(0); item < num_items; item += get_global_size(0)) {
-    uint rgba[PIXELS];
-    for (uint i = 0; i < PIXELS; ++i) {
-      const uint pixel = PIXELS * item + i;
-      rgba[i] = pixel < num_pixels ? shade_pixel(frame, &shade_params, samples, pixel % columns,
-                                                 pixel / columns, hits, open_counts, num_ambient)
+    uint rgba[ISO_PIXELS_OF_ITEM];
+    for (uint i = 0; i < ISO_PIXELS_OF_ITEM; ++i) {
+      const uint pixel = ISO_PIXELS_OF_ITEM * item + i;
+      rgba[i] = pixel < num_pixels ? shade_pixel(frame, &shade_params, color_map, samples,
+                                                 pixel % columns, pixel / columns, hits,
+                                                 open_counts, num_ambient, num_shadow, field_values)
                                    : 0;
     }
-    if (with_alpha) {
-      for (uint i = 0; i < PIXELS; ++i) image[4 * item + i] = rgba[i];
-    } else {
-      image[3 * item] = (rgba[0] & 0xffffffu) | rgba[1] << 24;
-      image[3 * item + 1] = (rgba[1] >> 8 & 0xffffu) | rgba[2] << 16;
-      image[3 * item + 2] = (rgba[2] >> 16 & 0xffu) | rgba[3] << 8;
-    }
+    store_pixels(rgba, with_alpha, image, item);
   }
 }
 

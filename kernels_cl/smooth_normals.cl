@@ -5,58 +5,13 @@
 ///
 /// All but the gradients of hits keep their bits.
 #define ISO_FOUND local
+#include "device/found_slots.h"
 #include "device/level_borders.h"
 #include "device/pass_counts.h"
-#include "device/slot_values.h"
 #include "device/touched_requests.h"
 #include "device/work_group.h"
 #include "portable/block_cells.h"
 #include "portable/smooth_gradient.h"
-
-/// Looks for those of the 2^3 blocks from `base` on whose bits (corner x + 2y + 4z) are set in
-/// `wanted`. Returns which of them are cached, and their places in slots [8], ISO_GROUP_SIZE apart.
-/// All are read before one is looked at: a GPU waits once.
-ISO_INLINE uint find_slots(const FrameParams *frame, global const BlockEntry *table,
-                           BlockCoords base, uint wanted, local uint *slots) {
-  uint keys[8], found[8], have = 0;
-  ISO_UNROLL
-  for (uint corner = 0; corner < 8; ++corner) {
-    keys[corner] = ISO_INVALID_ID;
-    found[corner] = ISO_BLOCK_ABSENT;
-    if ((wanted >> corner & 1u) != 0) {
-      const uint home = table_home(frame, base.x + (corner & 1), base.y + (corner >> 1 & 1),
-                                   base.z + (corner >> 2));
-      keys[corner] = table[home].block_id;
-      found[corner] = table[home].slot;
-    }
-  }
-  ISO_UNROLL
-  for (uint corner = 0; corner < 8; ++corner) {
-    const uint x = base.x + (corner & 1), y = base.y + (corner >> 1 & 1),
-               z = base.z + (corner >> 2);
-    uint slot = found[corner];
-    if (keys[corner] != ISO_INVALID_ID && keys[corner] != block_id_at(frame, x, y, z))
-      slot = cached_slot(frame, table, x, y, z);
-    slots[corner * ISO_GROUP_SIZE] = slot;
-    have |= (uint)(slot != ISO_BLOCK_ABSENT) << corner;
-  }
-  return have;
-}
-
-/// The voxels of a stencil in the cache: in slots [8] of the blocks from `base` on, ISO_GROUP_SIZE
-/// apart.
-typedef struct CachedStencil {
-  global const SlotValue *values;
-  local const uint *slots;
-  BlockCoords base;
-} CachedStencil;
-
-ISO_INLINE float stencil_voxel(const CachedStencil *cached, int x, int y, int z) {
-  const uint vx = (uint)x - 4 * cached->base.x, vy = (uint)y - 4 * cached->base.y,
-             vz = (uint)z - 4 * cached->base.z;
-  const uint slot = cached->slots[((vx >> 2) + 2 * (vy >> 2) + 4 * (vz >> 2)) * ISO_GROUP_SIZE];
-  return cached->values[slot * ISO_BLOCK_VOXELS + (vx & 3) + 4 * (vy & 3) + 16 * (vz & 3)];
-}
 
 /// See smooth_derivative(). All blocks are cached.
 ISO_INLINE Gradient cached_gradient(const CachedStencil *cached, const Stencil *s, CellPoint at) {
@@ -183,15 +138,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void smooth_n
                                       &counts->next_active_count, next_active_ray_ids);
       if (missing != 0 && place < window) {
         ISO_FRAME_OF(level, block_id);
-        for (uint corner = 0; corner < 8; ++corner) {
-          if ((touched & ~missing & 1u << corner) != 0)
-            stamp_needed(slot_stamps, slots[corner * ISO_GROUP_SIZE + item], needed_stamp(pass));
-        }
-        request_corners(level, base, unasked_corners(level, base, missing, requests), requests);
-        if (place == 0) {
-          cache->first_block_id = block_id_at(level, base.x, base.y, base.z);
-          cache->first_touched = touched;
-        }
+        request_missing(level, base, touched, missing, place, needed_stamp(pass), slots + item,
+                        slot_stamps, requests, cache);
       }
       list_staged(frame, requests, &list_begin);
       if (item == 0) num_waiting = 0;

@@ -52,7 +52,15 @@ std::array<std::uint32_t, 3> dims_of(const FrameParams &frame) {
   return {frame.grid.dims_x, frame.grid.dims_y, frame.grid.dims_z};
 }
 
-/// Is the field at a point of the cell the isovalue, as far as float32 can tell?
+/// The rays of a pixel at all levels.
+std::vector<OracleRay> rays_of(std::span<const FrameParams> frames, std::uint32_t pixel) {
+  std::vector<OracleRay> rays;
+  for (const FrameParams &frame : frames) rays.push_back(exact_ray(make_ray(&frame, pixel)));
+  return rays;
+}
+
+}  // namespace
+
 bool is_on_surface(const RootOracle &surface, const glm::dvec3 &point, const glm::ivec3 &cell,
                    double isovalue) {
   const auto difference = [&](const glm::dvec3 &at) {
@@ -65,14 +73,15 @@ bool is_on_surface(const RootOracle &surface, const glm::dvec3 &point, const glm
   return difference(point) <= kSameValue * largest;
 }
 
-/// The rays of a pixel at all levels.
-std::vector<OracleRay> rays_of(std::span<const FrameParams> frames, std::uint32_t pixel) {
-  std::vector<OracleRay> rays;
-  for (const FrameParams &frame : frames) rays.push_back(exact_ray(make_ray(&frame, pixel)));
-  return rays;
+bool is_cap_gradient(const ClipOracle &oracle, const HitRecord &record, std::uint32_t begun_by) {
+  for (std::size_t plane = 0; plane < oracle.planes().size(); ++plane) {
+    const glm::dvec3 right = vec(oracle.cap_gradient(plane)),
+                     got(record.grad_x, record.grad_y, record.grad_z);
+    if ((begun_by >> plane & 1u) != 0 && glm::length(got - right) <= 0x1p-22 * glm::length(right))
+      return true;
+  }
+  return false;
 }
-
-}  // namespace
 
 ClipOracle::ClipOracle(const VolumeInfo &finest, const Camera &camera, const Clip &clip,
                        std::span<const FrameParams> frames,
@@ -222,17 +231,6 @@ PlacedHit place(std::span<const FrameParams> frames, std::span<const OracleRay> 
   const FrameParams &frame = frames[level];
   record.block_id = x + frame.grid.blocks_x * (y + frame.grid.blocks_y * z);
   return {level, record, renderer_hit(frame, in_brick(frame, rays[level]), record)};
-}
-
-/// Is it the gradient of a plane at which the ray may begin?
-bool is_cap_gradient(const ClipOracle &oracle, const HitRecord &record, std::uint32_t begun_by) {
-  for (std::size_t plane = 0; plane < oracle.planes().size(); ++plane) {
-    const glm::dvec3 right = vec(oracle.cap_gradient(plane)),
-                     got(record.grad_x, record.grad_y, record.grad_z);
-    if ((begun_by >> plane & 1u) != 0 && glm::length(got - right) <= 0x1p-22 * glm::length(right))
-      return true;
-  }
-  return false;
 }
 
 /// None: the renderer is right.

@@ -70,6 +70,12 @@ class ClipOracle {
   std::deque<RootOracle> surfaces_;
 };
 
+/// Is the field at a point of the cell the isovalue, as far as float32 can tell?
+bool is_on_surface(const RootOracle &surface, const glm::dvec3 &point, const glm::ivec3 &cell,
+                   double isovalue);
+/// Is a cap's gradient that of a plane at which its ray may begin (KeptPart::begun_by)?
+bool is_cap_gradient(const ClipOracle &oracle, const HitRecord &record, std::uint32_t begun_by);
+
 /// A renderer's hits against the oracle. Each ray is counted once.
 struct ClipAccuracy {
   std::uint64_t rays = 0, hits = 0, caps = 0;  ///< hits and caps of the oracle

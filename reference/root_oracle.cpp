@@ -8,13 +8,17 @@
 #include <limits>
 #include <optional>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 namespace isowave::core {
 
 namespace {
 
-using Interval = boost::numeric::interval<double>;
+/// Its operations need a RoundsUp that lives: to set the rounding for each would take most of the
+/// time.
+using Interval = boost::numeric::interval_lib::unprotect<boost::numeric::interval<double>>::type;
+using RoundsUp = boost::numeric::interval<double>::traits_type::rounding;
 
 /// t at which the ray crosses a grid plane of one axis: (plane - origin) / direction, of exact
 /// numbers.
@@ -98,10 +102,16 @@ Side side(const mpq_class &x) {
   return x >= 0 ? Side::kInside : Side::kOutside;
 }
 
-/// Knowledge of the first change of inside on a piece of the segment.
-struct Answer {
-  enum Kind { kNone, kChange, kUndecided } kind;
-  double s = 0;
+/// A change of inside at s of the segment: from outside to inside, or back.
+struct Change {
+  double s;
+  bool enters;
+};
+/// Changes of a segment, in their order; as many as are wanted.
+struct Changes {
+  std::size_t most;
+  std::vector<Change> found{};
+  bool are_enough() const { return found.size() >= most; }
 };
 
 /// The number of distinct real roots in (0,1], by Sturm's chain, for what subdivision cannot end:
@@ -172,41 +182,46 @@ constexpr int kMaxDepth = 56;
 /// Interval arithmetic gives up earlier: its bounds no longer shrink.
 constexpr int kMaxIntervalDepth = 30;
 
-Answer undecided_piece(const Polynomial<Interval> &, double) {
-  return {Answer::kUndecided};
+bool append_from_small_piece(const Polynomial<Interval> &, double, Changes &) {
+  return false;
 }
 
-/// inside at the ends is alike (else the caller knows of a change): two near roots, one double
-/// root, or none.
-Answer undecided_piece(const Polynomial<mpq_class> &b, double s) {
-  if (side(b[0]) != side(b[3])) return {Answer::kChange, s};
-  if (side(b[0]) == Side::kOutside) {  // touching the isovalue is already inside
-    return {count_distinct_roots(b) > 0 ? Answer::kChange : Answer::kNone, s};
+/// One change if inside at the ends differs, else two near roots, one double root, or none.
+bool append_from_small_piece(const Polynomial<mpq_class> &b, double s, Changes &changes) {
+  const bool starts_outside = side(b[0]) == Side::kOutside;
+  int count = 1;
+  if (side(b[0]) == side(b[3])) {
+    const bool ends_on_zero = b[0] == 0 || b[3] == 0;
+    const int roots = count_distinct_roots(b);
+    // Touching the isovalue from outside is already inside.
+    count = (starts_outside ? roots > 0 : roots - (ends_on_zero ? 1 : 0) > 1) ? 2 : 0;
   }
-  const bool ends_on_zero = b[0] == 0 || b[3] == 0;
-  return {count_distinct_roots(b) - (ends_on_zero ? 1 : 0) > 1 ? Answer::kChange : Answer::kNone,
-          s};
+  for (int i = 0; i < count; ++i)
+    if (!changes.are_enough()) changes.found.push_back({s, starts_outside == (i == 0)});
+  return true;
 }
 
-/// The first change of inside on the piece [begin, begin + width] of [0,1], leftmost first.
+/// Appends the changes of inside on the piece [begin, begin + width] of [0,1], leftmost first,
+/// until they are enough. Returns false if the number type cannot tell what comes next.
 template <class Number>
-Answer first_change(const Polynomial<Number> &b, double begin, double width, int depth,
-                    int max_depth) {
+bool append_changes(const Polynomial<Number> &b, double begin, double width, int depth,
+                    int max_depth, Changes &changes) {
   std::array<Side, 4> sides;
   for (unsigned i = 0; i < 4; ++i) sides[i] = side(b[i]);
-  if (sides[0] == Side::kUnknown) return {Answer::kUndecided};
+  if (sides[0] == Side::kUnknown) return false;
   const bool known = std::find(sides.begin(), sides.end(), Side::kUnknown) == sides.end();
   int variations = 0;
   for (unsigned i = 1; i < 4; ++i) variations += sides[i] != sides[i - 1];
-  if (known && variations == 0)
-    return {Answer::kNone};  // the curve lies in the hull of its coefficients
-  if (known && variations == 1)
-    return {Answer::kChange, begin + width * place_of_root(b)};  // Descartes
-  if (depth >= max_depth) return undecided_piece(b, begin + 0.5 * width);
+  if (known && variations == 0) return true;  // the curve lies in the hull of its coefficients
+  if (known && variations == 1) {             // Descartes
+    changes.found.push_back({begin + width * place_of_root(b), sides[0] == Side::kOutside});
+    return true;
+  }
+  if (depth >= max_depth) return append_from_small_piece(b, begin + 0.5 * width, changes);
   const auto [left, right] = halves(b);
-  const Answer in_left = first_change(left, begin, 0.5 * width, depth + 1, max_depth);
-  if (in_left.kind != Answer::kNone) return in_left;
-  return first_change(right, begin + 0.5 * width, 0.5 * width, depth + 1, max_depth);
+  if (!append_changes(left, begin, 0.5 * width, depth + 1, max_depth, changes)) return false;
+  return changes.are_enough() ||
+         append_changes(right, begin + 0.5 * width, 0.5 * width, depth + 1, max_depth, changes);
 }
 
 /// Position of the ray at a crossing, relative to the cell's origin, as an interval or exactly.
@@ -222,18 +237,99 @@ std::array<Number, 3> position(const OracleRay &ray, const std::array<int, 3> &c
 }
 
 template <class Number>
-Answer change_in_cell(const std::array<double, 8> &v, double isovalue, const OracleRay &ray,
-                      const std::array<int, 3> &cell, const Number &t_enter, const Number &t_exit,
-                      int max_depth) {
+bool append_changes_in_cell(const std::array<double, 8> &v, double isovalue, const OracleRay &ray,
+                            const std::array<int, 3> &cell, const Number &t_enter,
+                            const Number &t_exit, int max_depth, Changes &changes) {
   const std::array<Number, 3> p = position(ray, cell, t_enter);
   const Number length = t_exit - t_enter;
   std::array<Number, 3> e;
   for (std::size_t axis = 0; axis < 3; ++axis) e[axis] = length * Number(ray.direction[axis]);
-  return first_change(bernstein(along_segment(v, isovalue, p, e)), 0.0, 1.0, 0, max_depth);
+  return append_changes(bernstein(along_segment(v, isovalue, p, e)), 0.0, 1.0, 0, max_depth,
+                        changes);
+}
+
+/// The same by intervals. Not inlined, so that no operation leaves the life of its RoundsUp.
+[[gnu::noinline]] bool append_changes_by_intervals(const std::array<double, 8> &v, double isovalue,
+                                                   const OracleRay &ray,
+                                                   const std::array<int, 3> &cell,
+                                                   const Crossing &enter, const Crossing &leave,
+                                                   const RoundsUp &, Changes &changes) {
+  return append_changes_in_cell(v, isovalue, ray, cell, enter.interval(), leave.interval(),
+                                kMaxIntervalDepth, changes);
+}
+
+[[gnu::noinline]] bool append_changes_of_cubic(const std::array<double, 4> &b, const RoundsUp &,
+                                               Changes &changes) {
+  return append_changes(Polynomial<Interval>{b[0], b[1], b[2], b[3]}, 0.0, 1.0, 0,
+                        kMaxIntervalDepth, changes);
 }
 
 bool lacks_data(const std::array<double, 8> &corners) {
   return std::ranges::any_of(corners, [](double value) { return std::isnan(value); });
+}
+
+/// Calls visit(cell, enter, leave) for each cell of the domain along the ray from t = begin on,
+/// until visit returns true.
+template <class Visit>
+void walk_cells(const OracleRay &ray, const std::array<std::uint32_t, 3> &dims, double begin,
+                Visit visit) {
+  const auto crossing = [&](std::size_t axis, int plane) {
+    Crossing c;
+    c.plane = plane;
+    c.origin = ray.origin[axis];
+    c.direction = ray.direction[axis];
+    c.t = (c.plane - c.origin) / c.direction;
+    c.axis = static_cast<int>(axis);
+    return c;
+  };
+  Crossing enter, exit;
+  enter.plane = enter.t = begin;
+  std::array<int, 3> cell{}, step{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {  // clip to the domain
+    const int last = static_cast<int>(dims[axis]) - 1;
+    if (ray.direction[axis] == 0) {
+      if (!(ray.origin[axis] >= 0 && ray.origin[axis] <= last)) return;
+      continue;
+    }
+    step[axis] = ray.direction[axis] > 0 ? 1 : -1;
+    const Crossing in = crossing(axis, step[axis] > 0 ? 0 : last),
+                   out = crossing(axis, step[axis] > 0 ? last : 0);
+    if (compare(in, enter) > 0) enter = in;
+    if (compare(out, exit) < 0) exit = out;
+  }
+  if (compare(enter, exit) >= 0) return;
+
+  std::array<Crossing, 3> next;  // the plane at which each axis leaves its current cell
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const int last_cell = static_cast<int>(dims[axis]) - 2;
+    const double x = ray.origin[axis] + enter.t * ray.direction[axis];
+    cell[axis] = std::clamp(static_cast<int>(std::floor(x)), 0, last_cell);
+    if (step[axis] == 0) continue;
+    const auto leaves = [&](int c) { return crossing(axis, step[axis] > 0 ? c + 1 : c); };
+    // The rounded position is a guess: the cell is the one whose exit is the first after the entry.
+    while (cell[axis] - step[axis] >= 0 && cell[axis] - step[axis] <= last_cell &&
+           compare(leaves(cell[axis] - step[axis]), enter) > 0) {
+      cell[axis] -= step[axis];
+    }
+    while (cell[axis] + step[axis] >= 0 && cell[axis] + step[axis] <= last_cell &&
+           compare(leaves(cell[axis]), enter) <= 0) {
+      cell[axis] += step[axis];
+    }
+    next[axis] = leaves(cell[axis]);
+  }
+
+  for (;;) {
+    std::size_t axis = 0;
+    for (std::size_t other = 1; other < 3; ++other) {
+      if (compare(next[other], next[axis]) < 0) axis = other;
+    }
+    const Crossing leave = next[axis];
+    if (compare(enter, leave) < 0 && visit(cell, enter, leave)) return;
+    cell[axis] += step[axis];
+    if (cell[axis] < 0 || cell[axis] > static_cast<int>(dims[axis]) - 2) return;
+    next[axis] = crossing(axis, step[axis] > 0 ? cell[axis] + 1 : cell[axis]);
+    enter = leave;
+  }
 }
 
 }  // namespace
@@ -275,77 +371,54 @@ std::optional<bool> RootOracle::inside(const OracleRay &ray, double t) const {
 }
 
 OracleHit RootOracle::first_hit(const OracleRay &ray, double begin) const {
-  const auto crossing = [&](std::size_t axis, int plane) {
-    Crossing c;
-    c.plane = plane;
-    c.origin = ray.origin[axis];
-    c.direction = ray.direction[axis];
-    c.t = (c.plane - c.origin) / c.direction;
-    c.axis = static_cast<int>(axis);
-    return c;
-  };
-  Crossing enter, exit;
-  enter.plane = enter.t = begin;
-  std::array<int, 3> cell{}, step{};
-  for (std::size_t axis = 0; axis < 3; ++axis) {  // clip to the domain
-    const int last = static_cast<int>(dims_[axis]) - 1;
-    if (ray.direction[axis] == 0) {
-      if (!(ray.origin[axis] >= 0 && ray.origin[axis] <= last)) return {};
-      continue;
-    }
-    step[axis] = ray.direction[axis] > 0 ? 1 : -1;
-    const Crossing in = crossing(axis, step[axis] > 0 ? 0 : last),
-                   out = crossing(axis, step[axis] > 0 ? last : 0);
-    if (compare(in, enter) > 0) enter = in;
-    if (compare(out, exit) < 0) exit = out;
-  }
-  if (compare(enter, exit) >= 0) return {};
+  const std::vector<OracleChange> changes = this->changes(ray, begin, 1);
+  return changes.empty() ? OracleHit{} : OracleHit{true, changes[0].t, changes[0].cell};
+}
 
-  std::array<Crossing, 3> next;  // the plane at which each axis leaves its current cell
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const int last_cell = static_cast<int>(dims_[axis]) - 2;
-    const double x = ray.origin[axis] + enter.t * ray.direction[axis];
-    cell[axis] = std::clamp(static_cast<int>(std::floor(x)), 0, last_cell);
-    if (step[axis] == 0) continue;
-    const auto leaves = [&](int c) { return crossing(axis, step[axis] > 0 ? c + 1 : c); };
-    // The rounded position is a guess: the cell is the one whose exit is the first after the entry.
-    while (cell[axis] - step[axis] >= 0 && cell[axis] - step[axis] <= last_cell &&
-           compare(leaves(cell[axis] - step[axis]), enter) > 0) {
-      cell[axis] -= step[axis];
-    }
-    while (cell[axis] + step[axis] >= 0 && cell[axis] + step[axis] <= last_cell &&
-           compare(leaves(cell[axis]), enter) <= 0) {
-      cell[axis] += step[axis];
-    }
-    next[axis] = leaves(cell[axis]);
-  }
-
-  for (;;) {
-    std::size_t axis = 0;
-    for (std::size_t other = 1; other < 3; ++other) {
-      if (compare(next[other], next[axis]) < 0) axis = other;
-    }
-    const Crossing leave = next[axis];
+std::vector<OracleChange> RootOracle::changes(const OracleRay &ray, double begin,
+                                              std::size_t most) const {
+  std::vector<OracleChange> result;
+  bool behind_gap = false;
+  walk_cells(ray, dims_, begin, [&](const auto &cell, const Crossing &enter, const auto &leave) {
     const std::array<double, 8> v = corners(cell);
     const bool inside = v[0] >= isovalue_;
     const bool mixed =
         std::any_of(v.begin() + 1, v.end(), [&](double x) { return (x >= isovalue_) != inside; });
-    if (mixed && !lacks_data(v) && compare(enter, leave) < 0) {
-      Answer answer = change_in_cell<Interval>(v, isovalue_, ray, cell, enter.interval(),
-                                               leave.interval(), kMaxIntervalDepth);
-      if (answer.kind == Answer::kUndecided) {
+    if (lacks_data(v)) {
+      behind_gap = true;
+    } else if (mixed) {
+      const std::size_t wanted = most - result.size();
+      Changes in_cell{wanted};
+      if (!append_changes_by_intervals(v, isovalue_, ray, cell, enter, leave, RoundsUp(),
+                                       in_cell)) {
         ++num_exact_cells_;
-        answer = change_in_cell<mpq_class>(v, isovalue_, ray, cell, enter.exact(), leave.exact(),
-                                           kMaxDepth);
+        in_cell = {wanted};
+        append_changes_in_cell<mpq_class>(v, isovalue_, ray, cell, enter.exact(), leave.exact(),
+                                          kMaxDepth, in_cell);
       }
-      if (answer.kind == Answer::kChange)
-        return {true, enter.t + answer.s * (leave.t - enter.t), cell};
+      for (const Change &change : in_cell.found) {
+        result.push_back({enter.t + change.s * (leave.t - enter.t), cell, change.enters,
+                          std::exchange(behind_gap, false)});
+      }
     }
-    cell[axis] += step[axis];
-    if (cell[axis] < 0 || cell[axis] > static_cast<int>(dims_[axis]) - 2) return {};
-    next[axis] = crossing(axis, step[axis] > 0 ? cell[axis] + 1 : cell[axis]);
-    enter = leave;
-  }
+    return result.size() >= most;
+  });
+  return result;
+}
+
+std::vector<double> RootOracle::borders(const OracleRay &ray) const {
+  std::vector<double> result;
+  double end = 0;
+  bool had_data = false;
+  walk_cells(ray, dims_, 0, [&](const auto &cell, const Crossing &enter, const Crossing &leave) {
+    const bool has_data = !lacks_data(corners(cell));
+    if (has_data != had_data) result.push_back(enter.t);
+    had_data = has_data;
+    end = leave.t;
+    return false;
+  });
+  if (had_data) result.push_back(end);
+  return result;
 }
 
 double RootOracle::field(const std::array<double, 3> &point) const {
@@ -378,13 +451,13 @@ std::array<double, 3> RootOracle::gradient(const std::array<double, 3> &point) c
 }
 
 std::optional<double> first_change_of_cubic(const std::array<double, 4> &b) {
-  Answer answer =
-      first_change(Polynomial<Interval>{b[0], b[1], b[2], b[3]}, 0.0, 1.0, 0, kMaxIntervalDepth);
-  if (answer.kind == Answer::kUndecided) {
-    answer = first_change(Polynomial<mpq_class>{b[0], b[1], b[2], b[3]}, 0.0, 1.0, 0, kMaxDepth);
+  Changes first{1};
+  if (!append_changes_of_cubic(b, RoundsUp(), first)) {
+    first = {1};
+    append_changes(Polynomial<mpq_class>{b[0], b[1], b[2], b[3]}, 0.0, 1.0, 0, kMaxDepth, first);
   }
-  if (answer.kind != Answer::kChange) return std::nullopt;
-  return answer.s;
+  if (first.found.empty()) return std::nullopt;
+  return first.found[0].s;
 }
 
 }  // namespace isowave::core

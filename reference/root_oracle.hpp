@@ -10,12 +10,24 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "reference/hit_oracle.hpp"
 
 namespace isowave::core {
+
+/// Where a ray changes sides.
+struct OracleChange {
+  double t = 0;               ///< as OracleHit::t
+  std::array<int, 3> cell{};  ///< dual cell in whose closed segment it lies
+  bool enters = false;        ///< inside is behind it
+  /// Between the change before, or the ray's beginning, and this one, the ray passes a cell without
+  /// data.
+  bool behind_gap = false;
+};
 
 class RootOracle final : public HitOracle {
  public:
@@ -26,6 +38,15 @@ class RootOracle final : public HitOracle {
   OracleHit first_hit(const OracleRay &ray) const override { return first_hit(ray, 0); }
   /// The same of the part of the ray from t = begin on, begin >= 0.
   OracleHit first_hit(const OracleRay &ray, double begin) const;
+  /// All changes of sides of that part, in their order, or the first `most` of them. A point at
+  /// which the ray touches the surface from outside is two: the ray enters and leaves there.
+  /// Between cells on both sides of a gap without data there is none.
+  std::vector<OracleChange> changes(
+      const OracleRay &ray, double begin,
+      std::size_t most = std::numeric_limits<std::size_t>::max()) const;
+  /// The t at which parts of the ray with data begin and end: where it enters and leaves the
+  /// domain, and cells without data.
+  std::vector<double> borders(const OracleRay &ray) const;
   /// Whether the ray's point at t is inside, decided exactly. None: its cell lacks data. A point
   /// beside the domain counts as the domain's nearest one.
   std::optional<bool> inside(const OracleRay &ray, double t) const;

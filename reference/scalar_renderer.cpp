@@ -12,6 +12,7 @@
 #include "core/view/detail.hpp"
 #include "kernels_cl/portable/cell_intersect.h"
 #include "kernels_cl/portable/clip.h"
+#include "kernels_cl/portable/layers.h"
 #include "kernels_cl/portable/smooth_gradient.h"
 
 namespace isowave::core {
@@ -212,6 +213,38 @@ void append_segments(const FrameParams &frame, std::span<const float> voxels, co
       });
 }
 
+HitRecord trace_scalar_behind(const FrameParams &frame, std::span<const float> voxels,
+                              const Ray &ray, const HitRecord &hit) {
+  check_voxels(frame, voxels);
+  const LastPlanes last = last_planes(&frame);
+  const RayEvent begin = border_event(ray.begin_t), end = border_event(ray.end_t);
+  const BlockCoords b = block_coords(&frame, hit.block_id);
+  GridWalk cell = walk_from(&ray, static_cast<int>(4 * b.x + (hit.cell & 3u)),
+                            static_cast<int>(4 * b.y + (hit.cell >> 2 & 3u)),
+                            static_cast<int>(4 * b.z + (hit.cell >> 4 & 3u)), 1, last);
+  RayEvent enter = region_entry(&ray, cell.x, cell.y, cell.z, 1, last);
+  if (event_before(enter, begin)) enter = begin;
+  const CellBox domain{glm::ivec3(0), {last.x, last.y, last.z}};
+  for (uint number = crossings_up_to(hit); contains(domain, cell); number = 0) {
+    RayEvent exit = walk_exit(&cell, &ray);
+    const bool ends = !event_before(exit, end);
+    if (ends) exit = end;
+    CellChange change;
+    float w[8];
+    load_corners(frame, voxels.data(), cell.x, cell.y, cell.z, w);
+    if (numbered_change_in_cell(&ray, w, cell.x, cell.y, cell.z, enter, exit, number, 1, &change)) {
+      HitRecord next = make_hit(&frame, &ray, w, cell.x, cell.y, cell.z, enter, exit,
+                                refine(kDefaultSolver, change.cubic, change.bracket));
+      next.cell |= number << ISO_CROSSING_BIT;
+      return next;
+    }
+    if (ends) break;
+    walk_step(&cell, &ray, exit, 1, last);
+    enter = exit;
+  }
+  return no_hit();
+}
+
 Ray in_band(const FrameParams &frame, Ray ray) {
   ray.begin_t = frame.band.begin_t;
   ray.end_t = frame.band.end_t;
@@ -288,14 +321,14 @@ void smooth_gradients(std::span<const FrameParams> frames,
 std::vector<uchar> count_open(std::span<const FrameParams> frames,
                               std::span<const VolumeInfo> levels,
                               std::span<const std::vector<float>> voxels,
-                              std::span<const HitRecord> hits, std::uint32_t num_rays,
-                              Solver solver, unsigned threads, const ClipParams &clip) {
+                              std::span<const HitRecord> hits, const LightRays &rays, Solver solver,
+                              unsigned threads, const ClipParams &clip) {
   const std::size_t first =
       static_cast<std::size_t>(std::ranges::find_if(frames, draws) - frames.begin());
   const FrameParams &seen = frames[first];
-  const AmbientParams params = make_ambient_params(levels[first]);
-  const std::vector<AmbientDirection> directions = make_ambient_directions(num_rays);
-  std::vector<uchar> counts(hits.size());
+  const AmbientParams params = make_ambient_params(levels[first], rays.num_ambient);
+  const std::vector<AmbientDirection> directions = make_light_directions(rays);
+  std::vector<uchar> counts((rays.num_shadow != 0 ? 2 : 1) * hits.size());
   parallel_for(seen.view.height, threads, [&](std::uint64_t row, std::uint32_t) {
     for (uint column = 0; column < seen.view.width; ++column) {
       const uint pixel = static_cast<uint>(row) * seen.view.width + column;
@@ -306,16 +339,18 @@ std::vector<uchar> count_open(std::span<const FrameParams> frames,
         ++level;
       if (frames.size() > 1) hit.block_id = level_block_of(&frames[level], hit.block_id);
       const HitRecord placed = placed_hit(&frames[level], static_cast<uint>(level - first), hit);
-      for (std::uint32_t k = 0; k < num_rays; ++k) {
+      for (std::uint32_t k = 0; k < rays.count(); ++k) {
         const GivenRay given =
-            ambient_ray(&seen, &params, placed, pixel,
+            ambient_ray(&seen, &params, placed, pixel, k,
                         directions[k * ISO_AMBIENT_PATTERNS + ambient_pattern(&seen, pixel)]);
+        if (!is_given(given)) continue;
         const HitRecord met =
             trace(frames[level], voxels[level].data(), solver, make_given_ray(given));
         const bool is_open = !std::isfinite(met.t) ||
                              is_clipped(&clip, given, std::ldexp(1.0f, static_cast<int>(level)),
                                         met.t / frames[level].view.t_scale);
-        counts[pixel] = static_cast<uchar>(counts[pixel] + is_open);
+        uchar &count = counts[pixel + (is_shadow_ray(&params, k) ? hits.size() : 0)];
+        count = static_cast<uchar>(count + is_open);
       }
     }
   });

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "core/frame/ambient_rays.hpp"
 #include "core/frame/solvers.hpp"
 #include "core/volume/volume.hpp"
 #include "kernels_cl/portable/grid_dda.h"
@@ -40,13 +41,14 @@ void smooth_gradients(std::span<const FrameParams> frames,
 void smooth_gradients(const FrameParams &frame, std::span<const float> voxels,
                       std::span<HitRecord> hits);
 
-/// How many of num_rays ambient rays of each hit meet nothing (kernels_cl/portable/ambient.h); 0
-/// where there is no hit. What a ray meets behind a clipping plane does not count. The arguments
-/// are those of render_scalar_levels(), and the levels' infos.
+/// How many ambient rays of each hit meet nothing (kernels_cl/portable/ambient.h), and behind these
+/// counts, how many shadow rays, if there are any; 0 if there is no hit. What a ray meets behind a
+/// clipping plane does not count. The arguments are those of render_scalar_levels(), and the
+/// levels' infos.
 std::vector<uchar> count_open(std::span<const FrameParams> frames,
                               std::span<const VolumeInfo> levels,
                               std::span<const std::vector<float>> voxels,
-                              std::span<const HitRecord> hits, std::uint32_t num_rays,
+                              std::span<const HitRecord> hits, const LightRays &rays,
                               Solver solver = kDefaultSolver, unsigned threads = 0,
                               const ClipParams &clip = {});
 
@@ -55,6 +57,11 @@ std::vector<uchar> count_open(std::span<const FrameParams> frames,
 HitRecord trace_scalar_levels(std::span<const FrameParams> frames,
                               std::span<const std::vector<float>> voxels, Solver solver,
                               std::span<const Ray> rays, const ClipParams &clip = {});
+
+/// The crossing of a ray behind a hit that it has, of the same surface, by `bernstein`; no_hit() if
+/// there is none. `ray` has its interval.
+HitRecord trace_scalar_behind(const FrameParams &frame, std::span<const float> voxels,
+                              const Ray &ray, const HitRecord &hit);
 
 /// The ray, with the frame's band as its interval.
 Ray in_band(const FrameParams &frame, Ray ray);

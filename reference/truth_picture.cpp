@@ -59,12 +59,14 @@ class TruthPainter {
   ///
   /// sky  place in [0,1)^2 of the direction in which the hit looks at the sky; none: all of it is
   ///      open
-  glm::dvec3 color_at(double x, double y, const std::optional<glm::dvec2> &sky) const {
+  /// behind  the background of the ray's pixel
+  glm::dvec3 color_at(double x, double y, const std::optional<glm::dvec2> &sky,
+                      const glm::dvec3 &behind) const {
     const SightLine world = ray_at(eye_, x, y);
     const glm::dvec3 origin = to_index_ * (world.origin - origin_),
                      direction = to_index_ * world.direction;
     const OracleHit hit = first_hit(origin, direction);
-    if (!hit.hit) return appearance_.background;
+    if (!hit.hit) return behind;
     const glm::dvec3 place = origin + hit.t * direction;
     const auto [x_slope, y_slope, z_slope] =
         oracle_.voxels().smooth_gradient({place.x, place.y, place.z}, hit.cell);
@@ -118,6 +120,12 @@ class TruthPainter {
   Appearance appearance_;
 };
 
+/// y  place in the picture, [0,1], from the upper edge
+glm::dvec3 background_of(const Appearance &appearance, double y) {
+  const glm::dvec3 bottom(appearance.background);
+  return glm::mix(bottom, glm::dvec3(appearance.background_top.value_or(bottom)), 1 - y);
+}
+
 /// Places in [0,1)^2 that the rays of a pixel, and those of its neighbours, spread evenly: a
 /// sequence by the plastic number, begun anew at each pixel.
 glm::dvec2 spread(std::size_t pixel, std::uint32_t ray) {
@@ -138,13 +146,14 @@ Image8 truth_picture(const GridOracle &oracle, const VolumeInfo &info, const Cam
   parallel_for(size.height, 0, [&](std::uint64_t row, std::uint32_t) {
     for (std::uint32_t column = 0; column < size.width; ++column) {
       const std::size_t pixel = row * size.width + column;
+      const glm::dvec3 behind = background_of(appearance, (double(row) + 0.5) / size.height);
       glm::dvec3 sum(0);
       for (std::uint32_t ray = 0; ray < size.samples * size.samples; ++ray) {
         const std::uint32_t x = ray % size.samples, y = ray / size.samples;
-        sum +=
-            painter.color_at((double(size.samples) * column + x + 0.5) / columns,
-                             (double(size.samples) * double(row) + y + 0.5) / rows,
-                             sky == Sky::kSeen ? std::optional(spread(pixel, ray)) : std::nullopt);
+        sum += painter.color_at(
+            (double(size.samples) * column + x + 0.5) / columns,
+            (double(size.samples) * double(row) + y + 0.5) / rows,
+            sky == Sky::kSeen ? std::optional(spread(pixel, ray)) : std::nullopt, behind);
       }
       const glm::dvec3 mean = sum / (double(size.samples) * size.samples);
       for (int channel = 0; channel < 3; ++channel)

@@ -1,6 +1,14 @@
 #include "reference/twin.hpp"
 
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/parallel_for.hpp"
 #include "core/frame/ambient_rays.hpp"
+#include "core/frame/field_values.hpp"
+#include "kernels_cl/portable/cell_intersect.h"
+#include "kernels_cl/portable/clip.h"
+#include "reference/field_twin.hpp"
 #include "reference/scalar_renderer.hpp"
 
 namespace isowave::core {
@@ -51,15 +59,105 @@ std::vector<HitRecord> Twin::render(const Camera &camera, ImageSize size, float 
   return hits;
 }
 
+namespace {
+
+/// All crossings of a ray with a surface, in their order: as many as may be drawn, and one more.
+std::vector<HitRecord> crossings(const FrameParams &frame, const std::vector<float> &voxels,
+                                 const Ray &ray, const ClipParams &clip) {
+  std::vector<HitRecord> hits;
+  HitRecord hit = trace_scalar_levels({&frame, 1}, {&voxels, 1}, kDefaultSolver, {&ray, 1}, clip);
+  while (std::isfinite(hit.t) && hits.size() <= ISO_MAX_LAYERS) {
+    hits.push_back(hit);
+    hit = trace_scalar_behind(frame, voxels, ray, hit);
+  }
+  return hits;
+}
+
+}  // namespace
+
+LayeredFrame Twin::render_layers(const Camera &camera, ImageSize size,
+                                 const std::vector<SurfaceStyle> &surfaces, const Appearance &light,
+                                 Normals normals, const Clip &clip_by, const Slices &slices) const {
+  check_surfaces(surfaces, slices);
+  const std::vector<std::uint32_t> order = innermost_first(surfaces);
+  std::vector<FrameParams> frames;  // in that order
+  frames.reserve(order.size());
+  for (const std::uint32_t surface : order)
+    frames.push_back(make_frame_params(levels_[0], camera, size, surfaces[surface].isovalue));
+  const ClipParams clip = make_clip_params(levels_[0], frames[0].view, camera, clip_by);
+  const Shading shading = make_shading(levels_[0], light);
+  const LayerParams colors =
+      make_layer_params(surfaces, slices, levels_[0], frames[0].view, camera);
+  FieldMap map = make_field_map({levels_.data(), 1}, levels_[0]);
+  map.first_surface = colors.num_surfaces;
+  const uint num_slices = colors.slices.num_planes;
+  const std::size_t num_rays = size.num_rays();
+  LayeredFrame result;
+  result.layers.assign(ISO_MAX_LAYERS, std::vector<HitRecord>(num_rays, no_hit()));
+  result.first_hits.assign(num_rays, no_hit());
+  result.colors.assign(num_rays, clear_ray());
+  std::vector<uchar> cut(num_rays);
+  parallel_for(num_rays, 0, [&](std::uint64_t i, std::uint32_t) {
+    const auto pixel = static_cast<uint>(i);
+    std::vector<std::vector<HitRecord>> left;  // [slice, then surface] in their order
+    for (uint slice = 0; slice < num_slices; ++slice) {
+      const HitRecord hit = slice_hit(frames.data(), &clip, &colors, slice, pixel);
+      left.emplace_back(std::isfinite(hit.t) ? 1 : 0, hit);
+    }
+    for (std::size_t k = 0; k < frames.size(); ++k) {
+      const FrameParams &frame = frames[k];
+      Ray ray = in_band(frame, make_ray(&frame, pixel));
+      const bool clips = surfaces[order[k]].clipped;
+      if (clips) clip_ray(&frame, &clip, pixel, &ray);
+      left.push_back(crossings(frame, voxels_[0], ray, clips ? clip : ClipParams{}));
+      std::ranges::reverse(left.back());
+      for (HitRecord &hit : left.back()) hit = with_surface(hit, order[k]);
+    }
+    const auto find_nearest = [&] {
+      std::size_t nearest = left.size();
+      for (std::size_t k = 0; k < left.size(); ++k) {
+        if (left[k].empty()) continue;
+        if (nearest == left.size() || left[k].back().t < left[nearest].back().t) nearest = k;
+      }
+      return nearest;
+    };
+    RayColor &color = result.colors[i];
+    for (std::size_t layer = 0; goes_on(color); ++layer) {
+      const std::size_t nearest = find_nearest();
+      if (nearest == left.size()) break;
+      if (layer == ISO_MAX_LAYERS) {
+        cut[i] = 1;
+        break;
+      }
+      HitRecord hit = left[nearest].back();
+      left[nearest].pop_back();
+      if (normals == Normals::kSmooth) smooth_gradients(frames[0], voxels_[0], {&hit, 1});
+      const float value = value_at_hit(map, levels_[0].dims, voxels_[0], hit);
+      if (is_unseen(&colors, hit, value)) continue;
+      result.layers[layer][i] = hit;
+      if (!std::isfinite(result.first_hits[i].t)) result.first_hits[i] = hit;
+      color = blend_hit(frames.data(), &shading.params, shading.color_map.data(), &colors, pixel,
+                        hit, value, color);
+    }
+  });
+  const auto is_hit = [](const HitRecord &hit) { return std::isfinite(hit.t); };
+  for (const std::vector<HitRecord> &layer : result.layers) {
+    const auto hits = static_cast<std::uint64_t>(std::ranges::count_if(layer, is_hit));
+    result.stats.hits += hits;
+    if (hits != 0) ++result.stats.layers;
+  }
+  result.stats.rays_cut = static_cast<std::uint64_t>(std::ranges::count(cut, 1));
+  return result;
+}
+
 OpenCounts Twin::open(const Camera &camera, ImageSize size, float isovalue,
-                      const std::vector<HitRecord> &hits, std::uint32_t num_rays, Solver solver,
+                      const std::vector<HitRecord> &hits, const LightRays &rays, Solver solver,
                       const Clip &clip) const {
-  check_ambient_rays(num_rays);
   const std::vector<FrameParams> frames =
       make_level_frames(levels_, camera, size, isovalue, voxel_pixels_);
-  return {count_open(frames, levels_, voxels_, hits, num_rays, solver, 0,
+  return {count_open(frames, levels_, voxels_, hits, rays, solver, 0,
                      make_clip_params(levels_[0], frames[0].view, camera, clip)),
-          num_rays};
+          rays.num_ambient, rays.num_shadow};
 }
 
 }  // namespace isowave::core

@@ -4,15 +4,26 @@
 
 #include <vector>
 
+#include "core/frame/ambient_rays.hpp"
 #include "core/frame/appearance.hpp"
 #include "core/frame/normals.hpp"
 #include "core/frame/solvers.hpp"
+#include "core/frame/surfaces.hpp"
 #include "core/view/clip.hpp"
 #include "core/view/detail.hpp"
 #include "core/zfp/level_bounds.hpp"
 #include "core/zfp/zfp_stream.hpp"
 
 namespace isowave::core {
+
+/// A frame of several or translucent surfaces, and slices.
+struct LayeredFrame {
+  /// [layer] hits [height * width], with their surfaces; none that is not blended.
+  std::vector<std::vector<HitRecord>> layers;
+  std::vector<HitRecord> first_hits;  ///< [height * width] each ray's first of them
+  std::vector<RayColor> colors;       ///< [height * width] the layers, blended
+  LayerStats stats{};
+};
 
 class Twin {
  public:
@@ -28,10 +39,17 @@ class Twin {
                                 Solver solver = kDefaultSolver, Normals normals = Normals::kSmooth,
                                 const Clip &clip = {}) const;
 
-  /// How open such hits are, of a renderer's frame with ambient rays.
+  /// How open such hits are, and how lit, of a renderer's frame with such rays.
   OpenCounts open(const Camera &camera, ImageSize size, float isovalue,
-                  const std::vector<HitRecord> &hits, std::uint32_t num_rays,
+                  const std::vector<HitRecord> &hits, const LightRays &rays,
                   Solver solver = kDefaultSolver, const Clip &clip = {}) const;
+
+  /// The layers that a renderer must find and blend, bit for bit, of the finest level of detail.
+  /// Finds all crossings of each ray with each surface before it merges them.
+  LayeredFrame render_layers(const Camera &camera, ImageSize size,
+                             const std::vector<SurfaceStyle> &surfaces, const Appearance &light,
+                             Normals normals = Normals::kSmooth, const Clip &clip = {},
+                             const Slices &slices = {}) const;
 
  private:
   double voxel_pixels_;

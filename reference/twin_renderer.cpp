@@ -6,6 +6,7 @@
 
 #include "core/base/error.hpp"
 #include "core/base/ms_since.hpp"
+#include "core/frame/field_values.hpp"
 #include "core/host/host_renderer.hpp"
 #include "core/view/detail.hpp"
 
@@ -19,6 +20,8 @@ Abilities TwinRenderer::abilities() const {
   abilities.bounds = true;
   abilities.given_rays = true;
   abilities.clipping = true;
+  abilities.field = field_.has_value();
+  if (solver_.kind == kDefaultSolver.kind) abilities.most_surfaces = ISO_MAX_SURFACES;
   abilities.solver = solver_;
   return abilities;
 }
@@ -37,13 +40,25 @@ FrameStats TwinRenderer::render(const FrameRequest &request) {
   }
   const auto begin = std::chrono::steady_clock::now();
   frame_ = make_frame_params(volume_.info, request.camera, size_, request.isovalue);
-  hits_ = twin_->render(request.camera, size_, request.isovalue, solver_, request.normals,
-                        request.clip);
   open_ = {};
-  if (request.ambient_rays != 0)
-    open_ = twin_->open(request.camera, size_, request.isovalue, hits_, request.ambient_rays,
-                        solver_, request.clip);
+  colors_.clear();
   FrameStats stats;
+  if (request.surfaces.empty()) {
+    hits_ = twin_->render(request.camera, size_, request.isovalue, solver_, request.normals,
+                          request.clip);
+  } else {
+    LayeredFrame layered =
+        twin_->render_layers(request.camera, size_, request.surfaces, request.light,
+                             request.normals, request.clip, request.slices);
+    hits_ = std::move(layered.first_hits);
+    colors_ = std::move(layered.colors);
+    stats.layers = layered.stats;
+  }
+  field_values_.clear();
+  if (request.field_values) field_values_ = field_->values(levels(), hits_, request.field_on_caps);
+  if (const LightRays rays = light_rays_of(request); rays.count() != 0)
+    open_ =
+        twin_->open(request.camera, size_, request.isovalue, hits_, rays, solver_, request.clip);
   stats.rays_hit = static_cast<std::uint64_t>(
       std::ranges::count_if(hits_, [](const HitRecord &hit) { return std::isfinite(hit.t); }));
   stats.total_ms = ms_since(begin);
@@ -61,23 +76,34 @@ std::vector<HitRecord> TwinRenderer::cast_rays(std::span<const WorldRay>, float,
   throw Error("the scalar reference casts no rays of any origin: draw on a device or the host");
 }
 
-Camera TwinRenderer::camera(std::span<const float> isovalues, std::optional<ImageSize> size) {
-  return HostRenderer(volume_).camera(isovalues, size.value_or(largest_));
+Camera TwinRenderer::camera(std::span<const float> isovalues, std::optional<ImageSize> size,
+                            std::uint32_t num_views) {
+  return HostRenderer(volume_).camera(isovalues, size.value_or(largest_), num_views);
 }
 
 FrameArrays TwinRenderer::fetch(const WantedArrays &wanted, const Appearance &appearance) {
   check_arrays(wanted, size_);
   const std::vector<HitRecord> hits = this->hits();
-  const ShadeParams shading = make_shade_params(volume_.info, appearance);
+  const Shading shading = shading_of(volume_.info, appearance);
   FrameArrays arrays;
   if (wanted.picture) {
-    const Image8 image = shade_scalar(frame_, shading, hits, size_.samples, open_);
+    const Image8 image =
+        colors_.empty() ? shade_scalar(frame_, shading, hits, size_.samples, open_, field_values_)
+                        : shade_layers_scalar(frame_, shading.params, colors_, size_.samples);
     arrays.picture = memory_.array<std::uint8_t>(image.pixels.size());
     std::ranges::copy(image.pixels, arrays.picture.begin());
   }
   const HitMap map = make_hit_map(levels());
-  add_hit_arrays(wanted, hits, shading, &map, memory_, arrays);
+  add_hit_arrays(wanted, hits, shading.params, &map, memory_, arrays);
+  if (wanted.field_values) {
+    arrays.field_values = memory_.array<float>(field_values_.size());
+    std::ranges::copy(field_values_, arrays.field_values.begin());
+  }
   return arrays;
+}
+
+std::optional<std::array<float, 2>> TwinRenderer::field_range() {
+  return range_of_values(field_values_);
 }
 
 std::vector<HitRecord> TwinRenderer::hits() {

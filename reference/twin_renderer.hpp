@@ -6,6 +6,7 @@
 
 #include "core/frame/renderer.hpp"
 #include "core/zfp/zfp_stream.hpp"
+#include "reference/field_twin.hpp"
 #include "reference/twin.hpp"
 
 namespace isowave::core {
@@ -13,8 +14,12 @@ namespace isowave::core {
 class TwinRenderer : public Renderer {
  public:
   /// volume: must outlive the renderer
-  TwinRenderer(const CompressedVolume &volume, ImageSize largest, Solver solver = kDefaultSolver)
-      : volume_(volume), largest_(largest), solver_(solver) {}
+  /// field: for FrameRequest::field_values; null: none
+  TwinRenderer(const CompressedVolume &volume, ImageSize largest, Solver solver = kDefaultSolver,
+               const CompressedVolume *field = nullptr)
+      : volume_(volume), largest_(largest), solver_(solver) {
+    if (field != nullptr) field_.emplace(*field);
+  }
 
   Abilities abilities() const override;
   std::vector<VolumeInfo> levels() const override;
@@ -25,11 +30,16 @@ class TwinRenderer : public Renderer {
   /// Throws  Error: the twin casts no rays of any origin
   std::vector<HitRecord> cast_rays(std::span<const WorldRay> rays, float isovalue,
                                    Normals normals) override;
-  Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {}) override;
+  Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {},
+                std::uint32_t num_views = 1) override;
 
   ImageSize size() const override { return size_; }
   FrameArrays fetch(const WantedArrays &wanted, const Appearance &appearance) override;
   std::vector<HitRecord> hits() override;
+  bool has_field_values() const override { return !field_values_.empty(); }
+  std::optional<std::array<float, 2>> field_range() override;
+  /// [height * width] Values of the field, if the last frame had FrameRequest::field_values.
+  const std::vector<float> &field_values() const { return field_values_; }
   void clear_cache() override { twin_.reset(); }
   std::uint64_t memory_bytes() const override { return 0; }
 
@@ -49,7 +59,10 @@ class TwinRenderer : public Renderer {
   ImageSize size_;
   FrameParams frame_{};
   std::vector<HitRecord> hits_;
+  std::vector<RayColor> colors_;  ///< of a frame of several or translucent surfaces
   OpenCounts open_;
+  std::optional<FieldTwin> field_;
+  std::vector<float> field_values_;
   HostMemory memory_;
 };
 

@@ -91,7 +91,7 @@ TEST(AmbientRays, BeginAboveTheHitAndLeaveByTheNormal) {
                  glm::normalize(glm::dvec3(0.1, -0.2, -1)));
   const glm::dmat3 to_world = info.index_to_world();
   const FrameParams frame = make_frame_params(info, orbit_cameras(info, 3)[1], {8, 6}, kIsovalue);
-  const AmbientParams params = make_ambient_params(info);
+  const AmbientParams params = make_ambient_params(info, 9);
   const auto directions = make_ambient_directions(9);
   Random random(4);
   for (uint pixel = 0; pixel < 48; ++pixel) {
@@ -115,7 +115,7 @@ TEST(AmbientRays, BeginAboveTheHitAndLeaveByTheNormal) {
     if (glm::dot(normal, view) > 0) normal = -normal;
     for (const AmbientDirection &direction : directions) {
       const GivenRay given =
-          ambient_ray(&frame, &params, placed_hit(&frame, 0, hit), pixel, direction);
+          ambient_ray(&frame, &params, placed_hit(&frame, 0, hit), pixel, 0, direction);
       const glm::dvec3 lift = glm::dvec3(given.o_x, given.o_y, given.o_z) - at;
       // Coordinates are below 32 and rounded by at most 2^-20 of a voxel.
       EXPECT_NEAR(glm::length(lift), 0.5, 1e-5);
@@ -123,7 +123,7 @@ TEST(AmbientRays, BeginAboveTheHitAndLeaveByTheNormal) {
       const glm::dvec3 d = glm::normalize(to_world * glm::dvec3(given.d_x, given.d_y, given.d_z));
       EXPECT_NEAR(glm::dot(d, normal), direction.z, 1e-5);
       const GivenRay coarser =
-          ambient_ray(&frame, &params, placed_hit(&frame, 2, hit), pixel, direction);
+          ambient_ray(&frame, &params, placed_hit(&frame, 2, hit), pixel, 0, direction);
       EXPECT_EQ(coarser.d_x, given.d_x / 4) << "voxels four times as long";
       EXPECT_EQ(coarser.level, 2u);
     }
@@ -148,7 +148,8 @@ TEST(AmbientRays, KeepAnglesBetweenDirections) {
 OpenCounts open_of_twin(const TestVolume &volume, const Camera &camera, ImageSize size,
                         float isovalue, std::uint32_t num_rays) {
   const Twin twin(volume.compressed);
-  return twin.open(camera, size, isovalue, twin.render(camera, size, isovalue), num_rays);
+  return twin.open(camera, size, isovalue, twin.render(camera, size, isovalue),
+                   {.num_ambient = num_rays});
 }
 
 /// No ray that leaves a ball from outside meets it, and none that is inside leaves.
@@ -161,7 +162,7 @@ TEST(AmbientTwin, ABallIsOpenOutsideAndClosedInside) {
     const Camera camera = inside ? test::camera_along(glm::dvec3(19.5), {1, 0.1, 0.2})
                                  : orbit_cameras(ball.info(), 1)[0];
     const std::vector<HitRecord> hits = twin.render(camera, kFrame, 0.3f);
-    const OpenCounts open = twin.open(camera, kFrame, 0.3f, hits, 12);
+    const OpenCounts open = twin.open(camera, kFrame, 0.3f, hits, {.num_ambient = 12});
     ASSERT_GT(test::num_hits(hits), 100u);
     for (std::size_t i = 0; i < hits.size(); ++i)
       ASSERT_EQ(open.counts[i], std::isfinite(hits[i].t) && !inside ? 12 : 0) << "pixel " << i;
@@ -182,7 +183,8 @@ class AmbientOnDevice : public testing::TestWithParam<PipelineOnDevice> {
     DeviceRenderer renderer(device_, volume, GetParam().with(options));
     for (const Camera &camera : cameras) {
       const auto hits = twin.render(camera, options.size, kIsovalue);
-      const OpenCounts open = twin.open(camera, options.size, kIsovalue, hits, num_rays);
+      const OpenCounts open =
+          twin.open(camera, options.size, kIsovalue, hits, {.num_ambient = num_rays});
       EXPECT_GT(std::set<uchar>(open.counts.begin(), open.counts.end()).size(), 2u)
           << "all is open, or closed";
       for (int again = 0; again < 2; ++again) {

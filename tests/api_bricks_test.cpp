@@ -9,6 +9,7 @@
 #include <thread>
 #include <utility>
 
+#include "tests/api_support.hpp"
 #include "tests/thread_meeting.hpp"
 
 namespace isowave {
@@ -81,6 +82,34 @@ TEST(ApiBricks, DrawWhatOneRendererDraws) {
   EXPECT_GT(expected.statistics.hits, 100u);
 }
 
+TEST(ApiBricks, SurfacesOfOneRenderer) {
+  const Compression exact{.exact = true};
+  FrameRequest request{.size = {48, 32}, .want_depth = true, .want_normals = true};
+  request.surfaces = {{.isovalue = 20, .opacity = 0.4f}, {90, {0.2f, 0.4f, 0.9f}, 0.7f}};
+  const RendererOptions options{.largest = {48, 32}, .with_surfaces = 2};
+  Renderer whole(open_device(), open_volume(kFuel, exact), options);
+  request.camera = whole.camera(request.surfaces);
+  const Frame expected = whole.render(request);
+  in_threads([&](Processes &processes, std::uint32_t rank) {
+    Renderer renderer = make_team_renderer(processes, kFuel, exact, {}, {.renderer = options});
+    EXPECT_EQ(renderer.camera(request.surfaces).eye, request.camera.eye);
+    const Frame frame = renderer.render(request);
+    EXPECT_EQ(frame.picture, rank == 0 ? expected.picture : std::vector<std::uint8_t>());
+    EXPECT_EQ(frame.depth, rank == 0 ? expected.depth : std::vector<float>());
+    EXPECT_EQ(frame.statistics.layers, expected.statistics.layers);
+    EXPECT_EQ(frame.statistics.layer_hits, expected.statistics.layer_hits);
+    if (rank == 0) {
+      EXPECT_EQ(frame.normals, expected.normals);
+      EXPECT_EQ(frame.statistics.hits, expected.statistics.hits);
+    }
+    FrameRequest in_passes = request;
+    in_passes.on_pass = [](const Progress &) { return true; };
+    EXPECT_THAT(core::test::error_of([&] { renderer.render(in_passes); }),
+                testing::HasSubstr("leave out on_pass"));
+  });
+  EXPECT_GT(expected.statistics.layers, 4u);
+}
+
 /// Also of a volume whose error is known only when it is compressed, brick by brick.
 TEST(ApiBricks, BoundsOfOneRenderer) {
   const Compression at_rate{.rate = 20, .measure_error = true};
@@ -147,6 +176,11 @@ TEST(ApiBricks, WhatGoesWrongIsThrownAtAll) {
           make(kFuel, {.renderer = {.largest = {16 + rank, 16}}});
         },
         "rank 1 has another request");
+    expect_error(
+        [&] {
+          make(kFuel, {.renderer = {.largest = {16, 16}, .with_surfaces = rank}});
+        },
+        "rank 1 has another request");
     Renderer renderer = make(kFuel, small);
     FrameRequest request{.isovalue = 40, .size = {16, 16}};
     request.camera = renderer.camera(40);
@@ -156,6 +190,9 @@ TEST(ApiBricks, WhatGoesWrongIsThrownAtAll) {
     request.want_bounds = true;
     expect_error([&] { renderer.render(request); }, "made with_bounds");
     request.want_bounds = false;
+    request.surfaces = {{.isovalue = 40}};
+    expect_error([&] { renderer.render(request); }, "made with_surfaces");
+    request.surfaces.clear();
     request.isovalue = static_cast<float>(40 + rank);
     expect_error([&] { renderer.render(request); }, "rank 1 has another request");
     request.isovalue = 40;

@@ -55,6 +55,31 @@ TEST(ApiHostRenderer, RefusesBadRequestsInOneLine) {
               HasSubstr("raise the limit"));
 }
 
+TEST(ApiHostRenderer, TurntablesBeginWhereTheCameraLooksFrom) {
+  Renderer renderer = make_host_renderer(public_volume());
+  const Camera one = renderer.camera(10, ImageSize{64, 48});
+  const auto views = [&](std::uint32_t count) {
+    return renderer.turntable({{.isovalue = 10}}, count, ImageSize{64, 48});
+  };
+  EXPECT_EQ(views(1).at(0).eye, one.eye);
+  const std::vector<Camera> four = views(4);
+  ASSERT_EQ(four.size(), 4u);
+  for (std::size_t k = 0; k < 4; ++k) {
+    EXPECT_EQ(four[k].at, one.at);
+    EXPECT_EQ(four[k].up, one.up);
+    const Vector3 &eye = four[k].eye, &next = four[(k + 1) % 4].eye;
+    EXPECT_NEAR(next[0] - one.at[0], eye[2] - one.at[2], 1e-9);
+    EXPECT_NEAR(next[2] - one.at[2], one.at[0] - eye[0], 1e-9);
+  }
+  const double farther =
+      (four[0].eye[1] - one.at[1]) / (one.eye[1] - one.at[1]);  // on the same line of sight
+  EXPECT_GE(farther, 1 - 1e-12);
+  for (const std::size_t axis : {0, 2})
+    EXPECT_NEAR(four[0].eye[axis] - one.at[axis], farther * (one.eye[axis] - one.at[axis]), 1e-9);
+  EXPECT_THAT(error_of([&] { views(0); }), HasSubstr("a turntable of 0 views"));
+  EXPECT_THAT(error_of([&] { views(100'001); }), HasSubstr("give 1 to 100000"));
+}
+
 TEST(ApiHostRenderer, CastRaysInTheWorld) {
   Grid grid{.dims = {21, 21, 21}, .spacing = {1, 2, 3}, .origin = {5, 6, 7}};
   std::vector<float> voxels;

@@ -213,6 +213,70 @@ TEST_P(BrickTeamOnDevice, ClippedVolumes) {
   }
 }
 
+/// Shadow rays go through the bricks of all ranks.
+TEST_P(BrickTeamOnDevice, Shadows) {
+  const RendererOptions options{.size = kFrame, .with_given_rays = true};
+  request_.ambient_rays = 1;
+  request_.shadow_rays = 2;
+  request_.light_angle = 20;
+  request_.light.towards_light = glm::dvec3(0.5, 1, -0.3);
+  const Image8 whole = picture_of_one(request_, options, request_.light);
+  on_ranks(4, options, [&](TeamRenderer &renderer, std::uint32_t rank) {
+    std::size_t num_images = 0;
+    FrameRequest request = request_;
+    request.on_pass = [&](const PassStats &) {
+      num_images += renderer.shade(request.light).pixels.empty() ? 0 : 1;
+      return true;
+    };
+    for (const OnPass &on_pass : {request.on_pass, OnPass()}) {
+      request.on_pass = on_pass;
+      renderer.render(request);
+      const Image8 image = renderer.shade(request.light);
+      EXPECT_TRUE(rank != 0 || image.pixels == whole.pixels);
+    }
+    EXPECT_TRUE(rank != 0 || num_images > 3);
+  });
+}
+
+/// What is seen through bricks is blended in their order, up to 16 crossings of all bricks.
+TEST_P(BrickTeamOnDevice, TranslucentSurfaces) {
+  for (const std::uint32_t samples : {1u, 2u}) {
+    const RendererOptions options{.size = {25, 17, samples}, .max_surfaces = 3};
+    for (const float opacity : {0.02f, 0.4f}) {
+      request_.surfaces = {{-0.3f, {0.9f, 0.2f, 0.1f}, opacity},
+                           {0.2f, {0.2f, 0.4f, 0.9f}, opacity},
+                           {0.5f, {0.8f, 0.8f, 0.3f}, 1}};
+      if (opacity < 0.1f) request_.surfaces.pop_back();
+      request_.clip = {{{{0.3, 1, 0.2}, 12}}, opacity < 0.1f};
+      request_.light.diffuse = 0.6f;
+      ocl::Device device(GetParam());
+      DeviceRenderer alone(device, volume_.compressed, options);
+      const FrameStats expected = alone.render(request_);
+      EXPECT_GT(expected.layers.layers, 4u);
+      EXPECT_EQ(expected.layers.rays_cut != 0, opacity < 0.1f) << "some rays have too many hits";
+      const Appearance transparent{.transparent = true};
+      const Image8 opaque = alone.shade({}), whole = alone.shade(transparent);
+      const std::vector<float> depth = alone.depth();
+      for (const std::uint32_t num_ranks : {2u, 5u}) {
+        on_ranks(num_ranks, options, [&](TeamRenderer &renderer, std::uint32_t rank) {
+          const FrameStats stats = renderer.render(request_);
+          EXPECT_EQ(stats.layers.layers, expected.layers.layers);
+          EXPECT_EQ(stats.layers.hits, expected.layers.hits);
+          EXPECT_EQ(stats.layers.rays_cut, expected.layers.rays_cut);
+          const Image8 image = renderer.shade({}), clear = renderer.shade(transparent);
+          const std::vector<float> of_team = renderer.depth();
+          const std::uint64_t num_hits = renderer.num_hits(stats);
+          if (rank != 0) return;
+          EXPECT_EQ(image.pixels, opaque.pixels);
+          EXPECT_EQ(clear.pixels, whole.pixels);
+          EXPECT_EQ(of_team, depth);
+          EXPECT_EQ(num_hits, expected.rays_hit);
+        });
+      }
+    }
+  }
+}
+
 std::size_t num_drawn(const Image8 &image) {
   std::size_t drawn = 0;
   for (std::size_t i = 0; i < image.pixels.size(); i += 3)

@@ -296,7 +296,8 @@ class AmbientBricksOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
                                             placed, levels);
           }
           LaterPasses stats;
-          const auto blocked = renderers[brick]->blocked_rays(round, num_rays, stats);
+          const auto blocked =
+              renderers[brick]->blocked_rays(round, {.num_ambient = num_rays}, stats);
           EXPECT_GT(stats.passes, 0u);
           for (std::size_t pixel = 0; pixel < num_pixels; ++pixel) {
             const bool meets = (blocked[pixel / 64] >> pixel % 64 & 1) != 0;
@@ -309,7 +310,8 @@ class AmbientBricksOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
               open.counts[pixel] + (std::isfinite(placed[pixel].t) && !is_met[pixel]));
       }
       const std::vector<HitRecord> hits = twin.render(cameras[view], options.size, kIsovalue);
-      const OpenCounts expected = twin.open(cameras[view], options.size, kIsovalue, hits, num_rays);
+      const OpenCounts expected =
+          twin.open(cameras[view], options.size, kIsovalue, hits, {.num_ambient = num_rays});
       EXPECT_EQ(open.counts, expected.counts);
       DeviceRenderer &renderer = *renderers.front();
       renderer.set_open(open);

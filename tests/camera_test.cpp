@@ -162,6 +162,61 @@ TEST(OrbitCameras, StandOnACircleAboutTheBox) {
   EXPECT_TRUE(orbit_cameras(info, 0).empty());
 }
 
+/// Where a point is in a picture of that aspect: within [-1, 1] if it is in the picture.
+glm::dvec2 place_of(const Camera &camera, const glm::dvec3 &point, double aspect) {
+  const CameraAxes axes = axes_of(camera);
+  const glm::dvec3 to = point - camera.eye;
+  const double tan_v = std::tan(glm::radians(camera.fovy_deg) / 2);
+  const double depth = glm::dot(to, axes.forward);
+  return {glm::dot(to, axes.right) / (depth * tan_v * aspect),
+          glm::dot(to, axes.up) / (depth * tan_v)};
+}
+
+TEST(Turntable, TurnsOnceAroundWhatTheFirstCameraLooksAt) {
+  const Camera first{{3, 5, 10}, {1, 2, 3}, {0, 1, 0}, 40};
+  const std::vector<Camera> cameras = turntable(first, 8);
+  ASSERT_EQ(cameras.size(), 8u);
+  EXPECT_EQ(cameras.front(), first);
+  for (std::size_t k = 0; k < cameras.size(); ++k) {
+    EXPECT_EQ(cameras[k].at, first.at);
+    EXPECT_EQ(cameras[k].up, first.up);
+    EXPECT_EQ(cameras[k].fovy_deg, 40);
+    const glm::dvec3 offset = cameras[k].eye - first.at, was = first.eye - first.at;
+    EXPECT_NEAR(offset.y, was.y, 1e-12);
+    // Anticlockwise from above, as --orbit: x grows with the sine.
+    const double turn = std::atan2(offset.x, offset.z) - std::atan2(was.x, was.z);
+    EXPECT_NEAR(std::remainder(turn - 0.785398163397448 * double(k), 6.28318530717959), 0, 1e-12);
+  }
+  EXPECT_EQ(turntable(first, 1), std::vector{first});
+}
+
+TEST(Turntable, TurnsAboutAnUpAxisThatIsNotTheWorlds) {
+  const Camera first{{5, 0, 0}, {0, 0, 0}, {0, 0, 2}, 40};
+  EXPECT_NEAR(glm::distance(turntable(first, 4).at(1).eye, glm::dvec3(0, 5, 0)), 0, 1e-12);
+}
+
+TEST(Turntable, KeepsALongBoxInAllPictures) {
+  VolumeInfo info;
+  info.dims = {101, 11, 11};
+  info.spacing = {1.0, 2.0, 0.5};
+  const glm::dvec3 begin(4, 0, 2), end(96, 8, 10);
+  constexpr double kAspect = 1.5;
+  double closest = 0;
+  for (const std::uint32_t n : {1u, 4u, 7u}) {
+    closest = 0;
+    for (const Camera &camera : turntable(camera_of_box(info, begin, end, kAspect, n), n)) {
+      for (int corner = 0; corner < 8; ++corner) {
+        const glm::dvec3 index(corner & 1 ? begin.x : end.x, corner & 2 ? begin.y : end.y,
+                               corner & 4 ? begin.z : end.z);
+        const glm::dvec2 place = glm::abs(place_of(camera, index * info.spacing, kAspect));
+        EXPECT_LT(std::max(place.x, place.y), 0.95 + 1e-9) << n;
+        closest = std::max({closest, place.x, place.y});
+      }
+    }
+    EXPECT_NEAR(closest, 0.95, 1e-9) << n << " views from no further than that needs";
+  }
+}
+
 TEST(OrbitCameras, FollowADirectionMatrix) {
   VolumeInfo info;
   info.dims = {11, 11, 11};

@@ -186,7 +186,12 @@ TEST_F(CliRanks, SamplesLevelsAndBricksAsAskedFor) {
 
 /// A plane through the middle of the whole, not of a brick; a cap that belongs to several bricks.
 TEST_F(CliRanks, ClippingPlanes) {
-  expect_same(convert("--exact"), "-i 20 --size 96x64 --clip 1,1,-0.5", 2);
+  expect_same(convert("--exact"),
+              "-i 20 --size 96x64 --clip 1,1,-0.5 --color-by 1,2,0 --background black,skin", 2);
+}
+
+TEST_F(CliRanks, Turntables) {
+  expect_same(convert("--exact"), "-i 90 --size 48x32 --turntable 3", 2);
 }
 
 TEST_F(CliRanks, AmbientRays) {
@@ -437,6 +442,9 @@ TEST_F(CliRanks, StatisticsOfEachRank) {
 TEST_F(CliRanks, RefuseWhatTheyCannotDo) {
   const std::string render = "render " + kFuel + " -i 40 --size 16x16 ";
   const std::string within = render + "--max-surface-error ";
+  expect_error(on_ranks(2, "render " + kFuel + " --surface 40,bone,0.5 --size 16x16 " +
+                               "--progress-dir " + quoted(folder_ / "passes")),
+               "--progress-dir: with mpirun, --surface draws no pictures of passes");
   expect_error(on_ranks(2, within + "1"), "convert --levels all, or do without them: --levels 1");
   expect_error(on_ranks(2, within + "0 --levels 1"), "give more than 0");
   expect_error(on_ranks(2, "render " + convert("--rate 8 --no-verify") +
@@ -447,6 +455,8 @@ TEST_F(CliRanks, RefuseWhatTheyCannotDo) {
   expect_error(on_ranks(2, render + "--bricks 2x2x1"), "2 processes draw a brick each");
   expect_error(on_ranks(2, render + "--voxel-pixels 1"), "convert --levels all");
   expect_error(on_ranks(2, "info " + kFuel), "only render and convert");
+  expect_error(on_ranks(2, "render " + quoted(folder_ / "*.zfp") + " -i 40"),
+               "with mpirun, all processes draw one volume");
   test::expect_one_line_error(render + "--bricks 1x1x1", "--bricks");
 }
 

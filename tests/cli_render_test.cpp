@@ -553,7 +553,7 @@ TEST(CliRender, BadOptionsAreOneLineAndLeaveNothing) {
   expect_refused(good + "--rate 0" + to, "1 to 32");
   expect_refused(good + "--rate 33" + to, "1 to 32");
   expect_refused(good + "--spacing 0" + to, "spacing");
-  expect_refused(good + "--color red" + to, "#RRGGBB");
+  expect_refused(good + "--color reddish" + to, "#RRGGBB");
   expect_refused(good + "--background '#12345g'" + to, "#RRGGBB");
   expect_refused(good + "--nonsense" + to, "nonsense");
   expect_refused(good + "--reference --progress-dir " + quoted(out / "p") + to, "--progress-dir");

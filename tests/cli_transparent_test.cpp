@@ -75,6 +75,8 @@ TEST_F(CliTransparent, WhatHasNoEffectIsRefused) {
   const std::string command = "render " + kHead + "--transparent ";
   expect_one_line_error(command + "--background '#FFFFFF' -o " + in("a.png"),
                         "--background: pictures with --transparent have none");
+  expect_one_line_error(command + "--background black,white -o " + in("a.png"),
+                        "--background: pictures with --transparent have none");
   expect_one_line_error(command + "--depth " + in("d.npy"),
                         "--transparent: no picture is written: give --output");
 }

@@ -107,6 +107,58 @@ TEST(CliVerify, TracesRaysAtClosedSurfacesByTwinAndDevice) {
             std::string::npos);
 }
 
+/// All layers of the scalar reference, and the first one of a device.
+TEST(CliVerify, JudgesLayers) {
+  const TemporaryFolder folder;
+  const std::string command =
+      "verify " + kHead +
+      " --size 48x36 --surface 180 --surface 60,,0.0625 --surface 100,bone,0.3 "
+      "--clip=-1,0.3,-0.4 --json " +
+      quoted(folder / "v.json");
+  for (const std::string options : {"", " --no-caps", " --device cpu"}) {
+    const auto run = run_isowave(command + options);
+    ASSERT_EQ(run.status, 0) << options << "\n" << run.out << run.err;
+    const json frame = json::parse(test::read_file(folder / "v.json"))["frames"][0];
+    const bool is_whole = options != " --device cpu";
+    EXPECT_EQ(frame["judged"], is_whole ? "all" : "first");
+    EXPECT_EQ(frame["rays"], 48 * 36);
+    EXPECT_EQ(frame["surfaces"][1], json::parse(R"({"isovalue":60.0,"opacity":0.0625})"));
+    EXPECT_GT(frame["hits"], 100);
+    EXPECT_EQ(frame["caps"] > 10, options != " --no-caps") << frame;
+    EXPECT_EQ(frame["most_hits"] > 4, is_whole) << frame;
+    EXPECT_LT(frame["undecided"], 5);
+    for (const char *failure : {"missed", "false", "wrong_order", "wrong_surfaces", "wrong_sides",
+                                "wrong_kinds", "wrong_places", "wrong_gradients"})
+      EXPECT_EQ(frame[failure], 0) << failure;
+  }
+}
+
+TEST(CliVerify, RefusesSurfacesInOneLine) {
+  const std::string command = "verify " + kHead + " --size 16x12 --surface ";
+  test::expect_one_line_error("verify --surface 100", "--surface: is for frames: give a VOLUME");
+  for (const char *value : {"100,", "100,,0.5,1", ",0.5"})
+    test::expect_one_line_error(command + value, "give VALUE, VALUE,COLOR, VALUE,COLOR,OPACITY or");
+  for (const char *value : {"x", "nan", "1e400"})
+    test::expect_one_line_error(command + value, "is no finite number that float32 holds");
+  test::expect_one_line_error(command + "100,,0", "an opacity of 0 is out of range");
+  test::expect_one_line_error(command + "9 --surface 9", "two surfaces have the isovalue 9");
+  test::expect_one_line_error(command + "9 -i 9", "--isovalue: frames of --surface have");
+  test::expect_one_line_error(command + "9 --oracle roots", "--oracle: frames of --surface have");
+  std::string nine = command + "1";
+  for (const char *value : {"2", "3", "4", "5", "6", "7", "8", "9"})
+    nine += std::string(" --surface ") + value;
+  test::expect_one_line_error(nine, "9 surfaces are more than a frame can have");
+}
+
+TEST(CliVerify, JudgesFramesOfTheHost) {
+  const auto run =
+      run_isowave("verify --oracle roots " + kHead + " --isovalue 100 --size 32x24 --device host");
+  EXPECT_EQ(run.status, 0) << run.out << run.err;
+  test::expect_one_line_error(
+      "verify " + kHead + " -i 9 --oracle roots --device host --solver linear",
+      "the host draws by the default solver");
+}
+
 TEST(CliVerify, RefusesWhatItCannotDo) {
   test::expect_one_line_error("verify --oracle cells", "give a VOLUME");
   EXPECT_NE(run_isowave("verify " + kHead + " --isovalue 100 --oracle none").status, 0);

@@ -4,96 +4,26 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <glm/gtc/matrix_transform.hpp>
 #include <limits>
 #include <string>
 
 #include "core/host/host_renderer.hpp"
-#include "core/io/open_volume.hpp"
 #include "core/view/detail.hpp"
-#include "core/zfp/zfp_accuracy.hpp"
 #include "reference/clip_oracle.hpp"
 #include "reference/twin_renderer.hpp"
-#include "tests/array_reader.hpp"
 #include "tests/clip_scene.hpp"
 #include "tests/frame_scene.hpp"
-#include "tests/no_data_volumes.hpp"
+#include "tests/oracle_volumes.hpp"
 #include "tests/ray_cases.hpp"
 
 namespace isowave::core {
 namespace {
 
+using test::ClipCase;
+using test::clips;
+using test::VolumeCase;
+
 constexpr ImageSize kSize{47, 33};
-
-struct VolumeCase {
-  std::string name;
-  CompressedVolume volume;  ///< with all levels of detail
-  float isovalue;
-};
-
-VolumeCase of_field(const char *name, const VolumeInfo &info, std::vector<float> voxels,
-                    float isovalue) {
-  ArrayReader reader(info, std::move(voxels));
-  return {name, compress(reader, CompressOptions{.rate = 14, .levels = 0}), isovalue};
-}
-
-VolumeCase gyroid() {
-  VolumeInfo info = test::grid_info({33, 29, 38}, {1, 1.3, 0.8});
-  info.origin = {-20, 35, 7};
-  return of_field("gyroid", info, test::sample(info.dims, test::gyroid_field(12)), 0.2f);
-}
-
-VolumeCase noise() {
-  const glm::uvec3 dims(22, 25, 19);
-  return of_field("noise", test::grid_info(dims), test::sample(dims, test::noise_field(7)), 0.5f);
-}
-
-VolumeCase holes() {
-  const glm::uvec3 dims(31, 26, 29);
-  const std::vector<float> voxels = test::sample(dims, test::gyroid_field(9));
-  return of_field("holes", test::grid_info(dims),
-                  test::with_hole(dims, voxels,
-                                  [](const glm::uvec3 &at) {
-                                    return glm::length(glm::dvec3(at) - glm::dvec3(15)) < 6 ||
-                                           (at.x + 3 * at.y + 7 * at.z) % 97 == 0;
-                                  }),
-                  0.1f);
-}
-
-VolumeCase head() {
-  const auto reader = open_volume(std::string(ISOWAVE_TEST_DATA) + "/head_41x41x41_uint8.raw.gz");
-  const BlockPrecision exact = choose_precision(*reader, {.exact = true}, {});
-  const auto again = open_volume(std::string(ISOWAVE_TEST_DATA) + "/head_41x41x41_uint8.raw.gz");
-  return {"head", compress(*again, CompressOptions{.precision = exact, .levels = 0}), 60.5f};
-}
-
-struct ClipCase {
-  std::string name;
-  std::vector<ClipPlane> planes;
-};
-
-/// Through the volume: one plane, a slab of two voxels between two planes, and a box whose edges
-/// are along no axis.
-std::vector<ClipCase> clips(const VolumeInfo &info) {
-  const glm::dvec3 middle = test::place_in(info, {0.52, 0.47, 0.55});
-  const auto plane = [](const glm::dvec3 &normal, const glm::dvec3 &point) -> ClipPlane {
-    return {normal, glm::dot(normal, point)};
-  };
-  const glm::dvec3 slanted(-2, 0.7, -1.1);
-  const glm::dmat3 turn(glm::rotate(glm::dmat4(1), 0.7, glm::dvec3(1, 2, 0.5)));
-  const double half_edge = 0.12 * test::size_of_grid(info);
-  std::vector<ClipPlane> box;
-  for (int axis = 0; axis < 3; ++axis) {
-    for (const double sign : {-1.0, 1.0}) {
-      const glm::dvec3 normal = sign * turn[axis];
-      box.push_back(plane(normal, middle - half_edge * normal));
-    }
-  }
-  return {
-      {"plane", {plane(slanted, middle)}},
-      {"slab", {plane(slanted, middle), plane(-slanted, middle + glm::normalize(slanted) * 2.0)}},
-      {"box", box}};
-}
 
 struct ViewCase {
   std::string name;
@@ -205,7 +135,9 @@ class ClippedVolume {
 };
 
 class ClippedFrames : public testing::TestWithParam<VolumeCase (*)()> {};
-INSTANTIATE_TEST_SUITE_P(Volumes, ClippedFrames, testing::Values(gyroid, noise, holes, head),
+INSTANTIATE_TEST_SUITE_P(Volumes, ClippedFrames,
+                         testing::Values(test::gyroid_volume, test::noise_volume,
+                                         test::holes_volume, test::head_volume),
                          [](const auto &of) { return of.param().name; });
 
 TEST_P(ClippedFrames, AreTheOracles) {
@@ -230,8 +162,8 @@ TEST_P(ClippedFrames, AreTheOracles) {
 /// on planes. What is certain there is right.
 TEST(ClippedFramesOnTheGrid, AreTheOracles) {
   const glm::uvec3 dims(22, 19, 25);
-  ClippedVolume volume(
-      of_field("gyroid", test::grid_info(dims), test::sample(dims, test::gyroid_field(11)), 0.3f));
+  ClippedVolume volume(test::of_field("gyroid", test::grid_info(dims),
+                                      test::sample(dims, test::gyroid_field(11)), 0.3f));
   const glm::dvec3 last = glm::dvec3(dims) - 1.0, middle = glm::floor(0.5 * last);
   const std::array box = box_planes({4, 5, 8}, {16, 12, 17}), domain = box_planes({0, 0, 0}, last);
   std::vector<ClipPlane> both(box.begin(), box.end());
@@ -259,8 +191,8 @@ TEST(ClippedFramesAnywhere, AreTheOracles) {
   ClipAccuracy all;
   for (const test::GridCase &grid : test::clipped_grids()) {
     if (grid.info.brick != BrickOf{}) continue;
-    ClippedVolume volume(
-        of_field("gyroid", grid.info, test::sample(grid.info.dims, test::gyroid_field(9)), 0.1f));
+    ClippedVolume volume(test::of_field("gyroid", grid.info,
+                                        test::sample(grid.info.dims, test::gyroid_field(9)), 0.1f));
     for (const Camera &camera : test::clipping_cameras(grid.info)) {
       for (int i = 0; i < 4; ++i) {
         const Clip clip = test::random_clip(grid.info, random);
@@ -297,7 +229,7 @@ class ClipJudge : public testing::Test {
   }
   static bool is_cap(const HitRecord &hit) { return (hit.cell & ISO_CAP) != 0; }
 
-  VolumeCase of_ = gyroid();
+  VolumeCase of_ = test::gyroid_volume();
   FrameRequest request_{.camera = views(of_.volume.info)[0].camera,
                         .isovalue = of_.isovalue,
                         .size = kSize,

@@ -115,8 +115,8 @@ Seen check(const CompressedVolume &volume, float isovalue, double voxel_pixels, 
       const auto expected =
           twin.render(camera, kSize, isovalue, kDefaultSolver, Normals::kSmooth, clip);
       expect_same_hits(draw(request), expected, kSize.width);
-      const OpenCounts open =
-          twin.open(camera, kSize, isovalue, expected, kAmbient, kDefaultSolver, clip);
+      const OpenCounts open = twin.open(camera, kSize, isovalue, expected,
+                                        {.num_ambient = kAmbient}, kDefaultSolver, clip);
       const OpenCounts got = open_of_last();
       for (std::size_t ray = 0; ray < expected.size(); ++ray) {
         const HitRecord &hit = expected[ray];

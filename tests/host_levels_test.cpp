@@ -77,7 +77,8 @@ Seen check(const CompressedVolume &volume, const std::vector<Camera> &cameras, f
       const auto expected = twin.render(request.camera, kSize, isovalue);
       expect_same_hits(renderer.hits(), expected, kSize.width);
       EXPECT_EQ(stats.rays_hit, test::num_hits(expected));
-      const OpenCounts open = twin.open(request.camera, kSize, isovalue, expected, 2);
+      const OpenCounts open =
+          twin.open(request.camera, kSize, isovalue, expected, {.num_ambient = 2});
       for (std::size_t ray = 0; ray < expected.size(); ++ray) {
         if (expected[ray].t == INFINITY) continue;
         EXPECT_EQ(renderer.open().counts[ray], open.counts[ray]) << "ray " << ray;

@@ -38,11 +38,12 @@ TEST(HostLoops, AllGiveTheSameBits) {
   const ShadeParams shading = make_shade_params(volume.info(), {});
   const Image8 picture = shade_scalar(frame, shading, expected);
   const auto directions = make_ambient_directions(3);
-  const AmbientRays ambient{make_ambient_params(volume.info()), directions.data(), 3, &frame, 0, 1};
+  const AmbientRays ambient{
+      make_ambient_params(volume.info(), 3), directions.data(), 3, &frame, 0, 1};
   const std::vector<FrameParams> frames = {frame};
   const std::vector<VolumeInfo> infos = {volume.info()};
   const std::vector<std::vector<float>> voxels = {volume.voxels};
-  const std::vector<uchar> open = count_open(frames, infos, voxels, expected, 3);
+  const std::vector<uchar> open = count_open(frames, infos, voxels, expected, {.num_ambient = 3});
   std::vector<HitRecord> smooth = expected;
   smooth_gradients(frame, volume.voxels, smooth);
   for (const HostLoops &loops : all_host_loops()) {
@@ -59,7 +60,7 @@ TEST(HostLoops, AllGiveTheSameBits) {
     loops.ambient({frame, blocks.field()}, {0, 0, 64, 48}, ambient, hits.data(), counts.data());
     EXPECT_EQ(counts, open);
     std::vector<std::uint8_t> row(3 * 64);
-    loops.shade(frame, shading, 1, 23, hits.data(), nullptr, 0, row.data());
+    loops.shade(frame, shading, 1, 23, hits.data(), nullptr, 0, 0, nullptr, row.data());
     EXPECT_EQ(std::memcmp(row.data(), picture.pixels.data() + 23 * row.size(), row.size()), 0);
     std::size_t num_compared = 0;
     for (std::uint32_t id = 0; id < volume.compressed.block_count(); ++id) {

@@ -81,7 +81,8 @@ class LevelPacketsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
       }
       if (as.ambient_rays != 0) {
         const OpenCounts got = renderer.open();
-        const auto open = twin.open(camera, kSize, isovalue, expected, as.ambient_rays);
+        const auto open =
+            twin.open(camera, kSize, isovalue, expected, {.num_ambient = as.ambient_rays});
         for (std::size_t ray = 0; ray < expected.size(); ++ray) {
           if (expected[ray].t == INFINITY) continue;
           EXPECT_EQ(got.counts[ray], open.counts[ray]) << "ray " << ray;

@@ -51,8 +51,9 @@ class FakeRenderer : public Renderer {
   std::vector<HitRecord> cast_rays(std::span<const WorldRay>, float, Normals) override {
     return std::vector<HitRecord>(rays_hit_);
   }
-  Camera camera(std::span<const float>, std::optional<ImageSize> size) override {
-    return {.eye = {rays_hit_, size.value().width, 0}};
+  Camera camera(std::span<const float>, std::optional<ImageSize> size,
+                std::uint32_t num_views) override {
+    return {.eye = {rays_hit_, size.value().width, num_views - 1}};
   }
   ImageSize size() const override { return size_; }
   std::vector<HitRecord> hits() override { return {}; }

@@ -285,7 +285,7 @@ Certificate certify(Renderer &renderer, const CompressedVolume &volume, const Fr
   const auto draw = [&](FieldBound bound) {
     FrameRequest of_bound = request;
     of_bound.normals = Normals::kCell;
-    of_bound.ambient_rays = 0;
+    of_bound.ambient_rays = of_bound.shadow_rays = 0;
     of_bound.bound = bound;
     of_bound.on_pass = {};
     for (const PassStats &pass : renderer.render(of_bound).passes)

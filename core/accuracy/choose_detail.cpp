@@ -130,7 +130,7 @@ class Judge {
         max_surface_error_(max_surface_error),
         by_(by) {
     request_.normals = Normals::kCell;
-    request_.ambient_rays = 0;
+    request_.ambient_rays = request_.shadow_rays = 0;
     request_.size = size_;
     request_.on_pass = {};
     const View view = make_view(levels_.front(), request.camera, size_);

@@ -72,12 +72,12 @@ struct TeamHeld {
 /// A text of the options in which all processes must agree.
 std::string text_of(const BrickOptions &options, const core::Storage &storage) {
   const RendererOptions &renderer = options.renderer;
-  return fmt::format("{} {} {} {} {} {} {} {} {} {} {} {} {} {} {}", renderer.largest.width,
+  return fmt::format("{} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {}", renderer.largest.width,
                      renderer.largest.height, renderer.largest.samples, renderer.with_levels,
                      renderer.with_bounds, renderer.with_time_budget, renderer.with_rays,
-                     options.bricks, storage.rate.value_or(0), storage.tolerance.value_or(0),
-                     storage.relative_tolerance.value_or(0), storage.exact, storage.levels,
-                     storage.map_nan.value_or(0),
+                     renderer.with_surfaces, options.bricks, storage.rate.value_or(0),
+                     storage.tolerance.value_or(0), storage.relative_tolerance.value_or(0),
+                     storage.exact, storage.levels, storage.map_nan.value_or(0),
                      storage.no_data ? fmt::to_string(*storage.no_data) : "none");
 }
 
@@ -90,6 +90,8 @@ void open(TeamHeld &held, const std::string &path, const Compression &compressio
   source.path = path;
   source.bricks = options.bricks;
   core::together(team, [&] {
+    if (options.renderer.field)
+      throw core::Error("a team draws without colours by a field: leave out field");
     source.storage = storage_for(path, compression);
     source.storage.measure_error |= options.renderer.with_bounds;
     source.overrides = to_overrides(raw);

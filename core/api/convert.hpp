@@ -16,5 +16,8 @@ inline glm::vec3 to_glm(const std::array<float, 3> &v) {
 inline Vector3 from_glm(const glm::dvec3 &v) {
   return {v.x, v.y, v.z};
 }
+inline std::array<float, 3> from_glm(const glm::vec3 &v) {
+  return {v.x, v.y, v.z};
+}
 
 }  // namespace isowave

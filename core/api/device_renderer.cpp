@@ -20,6 +20,8 @@ core::RendererOptions core_options(const RendererOptions &options, std::uint32_t
   result.with_bounds = options.with_bounds;
   result.with_kept_picture = options.with_time_budget;
   result.with_given_rays = options.with_rays;
+  result.max_surfaces = options.with_surfaces;
+  if (options.field) result.field = &options.field->implementation().volume;
   return result;
 }
 
@@ -68,8 +70,11 @@ Renderer::Renderer(std::shared_ptr<Device> device, std::shared_ptr<const Volume>
     : implementation_(core::guarded("making a renderer", [&] {
         check_there(device, volume);
         auto renderer = make_on_device(*device, *volume, options);
-        return make_implementation(std::shared_ptr<Turns>(device, &device->implementation().mutex),
-                                   device, volume, std::move(renderer));
+        auto result =
+            make_implementation(std::shared_ptr<Turns>(device, &device->implementation().mutex),
+                                device, volume, std::move(renderer));
+        result->field = options.field;
+        return result;
       })) {}
 
 }  // namespace isowave

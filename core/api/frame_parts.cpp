@@ -11,6 +11,7 @@
 #include "core/api/convert.hpp"
 #include "core/base/error.hpp"
 #include "core/base/parallel_for.hpp"
+#include "core/view/color_maps.hpp"
 #include "core/view/detail.hpp"
 #include "core/zfp/isovalue.hpp"
 
@@ -20,10 +21,13 @@ namespace {
 
 FrameStatistics public_statistics(const core::FrameStats &stats, std::uint64_t num_rays) {
   FrameStatistics result;
-  result.passes =
-      static_cast<std::uint32_t>(stats.passes.size()) + stats.normals.passes + stats.ambient.passes;
+  result.passes = static_cast<std::uint32_t>(stats.passes.size()) + stats.normals.passes +
+                  stats.field.passes + stats.ambient.passes;
   result.rays = num_rays;
   result.hits = stats.rays_hit;
+  result.layers = stats.layers.layers;
+  result.layer_hits = stats.layers.hits;
+  result.rays_cut = stats.layers.rays_cut;
   for (const core::PassStats &pass : stats.passes) {
     result.decoded_blocks += pass.counts.decoded_count;
     for (const auto &[stage, ms] : pass.stage_ms) result.stage_ms[stage] += ms;
@@ -33,8 +37,9 @@ FrameStatistics public_statistics(const core::FrameStats &stats, std::uint64_t n
   result.normals_ms = stats.normals.ms;
   result.ambient_passes = stats.ambient.passes;
   result.ambient_ms = stats.ambient.ms;
-  result.decoded_blocks += stats.normals.decoded_blocks + stats.ambient.decoded_blocks;
-  for (const core::LaterPasses *later : {&stats.normals, &stats.ambient}) {
+  result.field_ms = stats.field.ms;
+  for (const core::LaterPasses *later : {&stats.normals, &stats.field, &stats.ambient}) {
+    result.decoded_blocks += later->decoded_blocks;
     for (const auto &[stage, ms] : later->stage_ms) result.stage_ms[stage] += ms;
   }
   result.uploaded_bytes = stats.uploaded_bytes;
@@ -46,15 +51,15 @@ FrameStatistics public_statistics(const core::FrameStats &stats, std::uint64_t n
   return result;
 }
 
-core::Camera core_camera(const Camera &camera) {
-  return {to_glm(camera.eye), to_glm(camera.at), to_glm(camera.up), camera.fovy_degrees,
-          camera.parallel_height};
-}
-
 }  // namespace
 
 core::ImageSize core_size(const ImageSize &size) {
   return {size.width, size.height, size.samples};
+}
+
+core::Camera core_camera(const Camera &camera) {
+  return {to_glm(camera.eye), to_glm(camera.at), to_glm(camera.up), camera.fovy_degrees,
+          camera.parallel_height};
 }
 
 Camera public_camera(const core::Camera &camera) {
@@ -62,20 +67,104 @@ Camera public_camera(const core::Camera &camera) {
           camera.parallel_height};
 }
 
-core::Appearance core_appearance(const Appearance &appearance) {
-  return {to_glm(appearance.surface), to_glm(appearance.background), appearance.ambient,
-          appearance.diffuse,         appearance.specular,           appearance.above,
-          appearance.transparent};
+core::Clip core_clip(const std::vector<ClipPlane> &planes, bool caps) {
+  core::Clip clip{.caps = caps};
+  for (const ClipPlane &plane : planes) clip.planes.push_back({to_glm(plane.normal), plane.offset});
+  return clip;
+}
+
+core::ColorTable color_table_of(const std::string &map,
+                                const std::vector<std::array<float, 3>> &colors) {
+  if (colors.empty()) return core::color_map(map);
+  core::ColorTable table{};
+  if (colors.size() != table.size())
+    throw core::Error("a colour table of {} colours cannot be used: give {}", colors.size(),
+                      table.size());
+  for (std::size_t i = 0; i < table.size(); ++i) {
+    for (std::size_t channel = 0; channel < 3; ++channel) {
+      const float value = colors[i][channel];
+      if (!(value >= 0 && value <= 1))
+        throw core::Error("a colour of {} is out of range: give 0 to 1", value);
+      table[i] |= static_cast<std::uint32_t>(std::lround(255 * value)) << 8 * channel;
+    }
+  }
+  return table;
+}
+
+std::vector<std::string> color_map_names() {
+  const auto names = core::color_map_names();
+  return {names.begin(), names.end()};
+}
+
+core::Appearance core_appearance(const Appearance &appearance, const core::VolumeInfo &whole) {
+  core::Appearance result{.surface = to_glm(appearance.surface),
+                          .background = to_glm(appearance.background),
+                          .ambient = appearance.ambient,
+                          .diffuse = appearance.diffuse,
+                          .specular = appearance.specular,
+                          .above = appearance.above,
+                          .transparent = appearance.transparent};
+  if (appearance.background_top) result.background_top = to_glm(*appearance.background_top);
+  if (appearance.light_direction) result.towards_light = to_glm(*appearance.light_direction);
+  core::check_light(result.towards_light);
+  if (appearance.color_map.empty() && appearance.color_table.empty()) {
+    if (appearance.color_by_field)
+      throw core::Error("colours by a field need a colour map: give color_map or color_table");
+    return result;
+  }
+  if (!appearance.color_map.empty() && !appearance.color_table.empty())
+    throw core::Error("colours are those of color_map or of color_table: leave out either");
+  const core::ColorTable colors = color_table_of(appearance.color_map, appearance.color_table);
+  if (appearance.color_by_field) {
+    result.color_by_field = {appearance.color_low, appearance.color_high, colors};
+    core::check_color_by_field(*result.color_by_field);
+    return result;
+  }
+  core::ColorByAxis by{.axis = to_glm(appearance.color_axis), .colors = colors};
+  core::check_color_by(by);
+  const auto [low, high] = core::range_along(whole, by.axis);
+  by.low = appearance.color_low.value_or(low);
+  by.high = appearance.color_high.value_or(high);
+  core::check_color_by(by);
+  result.color_by = by;
+  return result;
+}
+
+core::Slices core_slices(const std::vector<Slice> &slices, const Appearance &appearance,
+                         const std::array<float, 2> &value_range) {
+  core::Slices result;
+  if (slices.empty()) return result;
+  for (const Slice &slice : slices)
+    result.planes.push_back({{to_glm(slice.normal), slice.offset}, slice.opacity, slice.clipped});
+  result.colors = color_table_of(appearance.slice_map, appearance.slice_table);
+  result.low = appearance.slice_low.value_or(value_range[0]);
+  result.high = appearance.slice_high.value_or(value_range[1]);
+  if (!appearance.slice_low && !appearance.slice_high) {
+    if (!std::isfinite(result.low))
+      throw core::Error(
+          "the volume does not state its range of values, which colours of slices have: give "
+          "slice_low and slice_high");
+    if (result.low == result.high) result.high = std::nextafter(value_range[1], 3.4e38f);
+  }
+  return result;
 }
 
 core::FrameRequest core_request(const FrameRequest &request, const core::CompressedVolume &volume) {
   core::FrameRequest result;
   result.camera = core_camera(request.camera);
-  result.isovalue = core::drawn_isovalue(volume, request.isovalue);
+  for (const Surface &surface : request.surfaces)
+    result.surfaces.push_back({core::drawn_isovalue(volume, surface.isovalue),
+                               to_glm(surface.color), surface.opacity, surface.clipped});
+  result.slices = core_slices(request.slices, request.appearance, volume.value_range);
+  if (result.surfaces.empty() && !request.slices.empty())
+    result.surfaces.push_back(
+        {core::drawn_isovalue(volume, request.isovalue), to_glm(request.appearance.surface)});
+  // Several surfaces have their own isovalues.
+  result.isovalue = result.surfaces.empty() ? core::drawn_isovalue(volume, request.isovalue)
+                                            : result.surfaces.front().isovalue;
+  result.light = core_appearance(request.appearance, volume.info);
   result.size = core_size(request.size);
-  for (const ClipPlane &plane : request.clip)
-    result.clip.planes.push_back({to_glm(plane.normal), plane.offset});
-  result.clip.caps = request.caps;
+  result.clip = core_clip(request.clip, request.caps);
   result.voxel_pixels = request.voxel_pixels;
   result.voxel_error = request.voxel_error;
   result.bound = static_cast<core::FieldBound>(request.bound);
@@ -83,7 +172,14 @@ core::FrameRequest core_request(const FrameRequest &request, const core::Compres
       request.want_picture || request.want_normals || request.want_hits || request.on_pass;
   result.normals =
       shows_normals ? static_cast<core::Normals>(request.normals) : core::Normals::kCell;
-  if (request.want_picture || request.on_pass) result.ambient_rays = request.ambient_rays;
+  const bool has_colors = request.want_picture || request.on_pass;
+  result.field_values = request.want_field || (request.appearance.color_by_field && has_colors);
+  result.field_on_caps = request.appearance.color_caps_alone;
+  if (has_colors) {
+    result.ambient_rays = request.ambient_rays;
+    result.shadow_rays = request.appearance.shadow_rays;
+  }
+  result.light_angle = request.appearance.light_angle;
   result.max_surface_error = request.max_surface_error;
   result.by = static_cast<core::Evidence>(request.by);
   std::ranges::transform(request.series, std::back_inserter(result.series), core_camera);
@@ -101,6 +197,9 @@ void check_wanted(const FrameRequest &request, const core::Abilities &abilities)
     throw core::Error("the surface of a bound has no error: draw the volume itself");
   if (!request.clip.empty())
     throw core::Error("errors are bounded of whole surfaces: leave out clip, or want_bounds");
+  if (!request.surfaces.empty() || !request.slices.empty())
+    throw core::Error(
+        "errors are bounded of one opaque surface: leave out surfaces and slices, or want_bounds");
   if (!abilities.bounds) {
     throw core::Error(
         "this renderer knows no bounds of the error: leave out want_bounds, or draw on the host, "
@@ -129,7 +228,10 @@ std::string text_of(const FrameRequest &request) {
     }
   };
   const auto visit = [&]<class Field>(const char *, const Field &field) {
-    if constexpr (requires { field.has_value(); }) {
+    if constexpr (requires { field->begin(); }) {
+      add(field.has_value());
+      for (const auto value : field.value_or(typename Field::value_type{})) add(value);
+    } else if constexpr (requires { field.has_value(); }) {
       add(field.has_value());
       add(field.value_or(0));
     } else if constexpr (requires { field.begin(); }) {
@@ -142,9 +244,18 @@ std::string text_of(const FrameRequest &request) {
     if constexpr (std::is_same_v<Field, std::vector<Camera>>) {
       add(field.size());
       for (const Camera &camera : field) for_each_camera_field(camera, visit);
+    } else if constexpr (std::is_same_v<Field, std::vector<std::array<float, 3>>>) {
+      add(field.size());
+      for (const auto &color : field) visit(name, color);
     } else if constexpr (std::is_same_v<Field, std::vector<ClipPlane>>) {
       add(field.size());
       for (const ClipPlane &plane : field) for_each_plane_field(plane, visit);
+    } else if constexpr (std::is_same_v<Field, std::vector<Surface>>) {
+      add(field.size());
+      for (const Surface &surface : field) for_each_surface_field(surface, visit);
+    } else if constexpr (std::is_same_v<Field, std::vector<Slice>>) {
+      add(field.size());
+      for (const Slice &slice : field) for_each_slice_field(slice, visit);
     } else {
       visit(name, field);
     }
@@ -230,6 +341,7 @@ void move_arrays(core::FrameArrays &&arrays, Frame &frame) {
   frame.picture = public_array(std::move(arrays.picture));
   frame.depth = public_array(std::move(arrays.depth));
   frame.normals = public_array(std::move(arrays.normals));
+  frame.field = public_array(std::move(arrays.field_values));
   frame.positions = public_array(std::move(arrays.positions));
 }
 
@@ -246,6 +358,8 @@ Array<Hit> public_hits(std::span<const core::HitRecord> records,
     hit.cell = {cell.x, cell.y, cell.z};
     hit.position = {record.x, record.y, record.z};
     hit.gradient = {record.grad_x, record.grad_y, record.grad_z};
+    hit.surface = core::surface_of(record);
+    hit.cap = (record.cell & ISO_CAP) != 0;
     return hit;
   });
   return public_array(std::move(hits));

@@ -14,8 +14,21 @@
 namespace isowave {
 
 core::ImageSize core_size(const ImageSize &size);
+core::Camera core_camera(const Camera &camera);
 Camera public_camera(const core::Camera &camera);
-core::Appearance core_appearance(const Appearance &appearance);
+core::Clip core_clip(const std::vector<ClipPlane> &planes, bool caps);
+/// value_range  of the volume; infinite: not known
+/// Throws       core::Error: the range is needed, and not known; there is no such colour map
+core::Slices core_slices(const std::vector<Slice> &slices, const Appearance &appearance,
+                         const std::array<float, 2> &value_range);
+/// The colours of the map of that name, or of a table [256] instead.
+///
+/// Throws  core::Error: there is no such map, or the table is none
+core::ColorTable color_table_of(const std::string &map,
+                                const std::vector<std::array<float, 3>> &colors);
+/// whole   of the whole volume
+/// Throws  core::Error: a colour map that there is not, or that cannot be shown
+core::Appearance core_appearance(const Appearance &appearance, const core::VolumeInfo &whole);
 /// The request as core has it, without on_pass.
 core::FrameRequest core_request(const FrameRequest &request, const core::CompressedVolume &volume);
 

@@ -13,15 +13,18 @@ namespace isowave {
 
 std::unique_ptr<core::Renderer> make_on_host(const core::CompressedVolume &volume,
                                              const HostRendererOptions &options) {
-  return add_choices(std::make_unique<core::HostRenderer>(
-                         volume, core::HostRendererOptions{.memory_limit = options.memory_limit,
-                                                           .num_threads = options.num_threads,
-                                                           .largest = core_size(options.largest)}),
+  const core::HostRendererOptions core_options{
+      .memory_limit = options.memory_limit,
+      .num_threads = options.num_threads,
+      .field = options.field ? &options.field->implementation().volume : nullptr,
+      .largest = core_size(options.largest)};
+  return add_choices(std::make_unique<core::HostRenderer>(volume, core_options),
                      {.with_time_budget = true}, volume, volume.rate());
 }
 
-core::Abilities abilities_on_host(const core::CompressedVolume &volume) {
+core::Abilities abilities_on_host(const core::CompressedVolume &volume, bool has_field) {
   core::Abilities abilities = core::HostRenderer::abilities_of(volume);
+  abilities.field = has_field;
   abilities.surface_error = abilities.sampled_error = abilities.time_budget = true;
   return abilities;
 }
@@ -31,8 +34,10 @@ Renderer make_host_renderer(std::shared_ptr<const Volume> volume,
   return core::guarded("making a renderer", [&] {
     if (!volume) throw core::Error("a renderer needs a volume");
     auto on_host = make_on_host(volume->implementation().volume, options);
-    return Renderer(std::make_unique<Renderer::Implementation>(
-        std::make_shared<Turns>(), std::move(volume), std::move(on_host)));
+    auto result = std::make_unique<Renderer::Implementation>(std::make_shared<Turns>(),
+                                                             std::move(volume), std::move(on_host));
+    result->field = options.field;
+    return Renderer(std::move(result));
   });
 }
 

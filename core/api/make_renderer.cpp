@@ -49,8 +49,9 @@ Renderer make_renderer(std::shared_ptr<const Volume> volume, const RendererOptio
     if (!volume) throw core::Error("a renderer needs a volume");
     if (host_draws(core::ocl::choose_drawing(selector), *volume, options,
                    option_of_devices(options, device_options))) {
-      return make_host_renderer(
-          std::move(volume), {.memory_limit = options.memory_budget, .largest = options.largest});
+      return make_host_renderer(std::move(volume), {.memory_limit = options.memory_budget,
+                                                    .field = options.field,
+                                                    .largest = options.largest});
     }
     return make_quick_renderer(open_device(selector, device_options), std::move(volume), options);
   });

@@ -48,14 +48,19 @@ Renderer make_quick_renderer(std::shared_ptr<Device> device, std::shared_ptr<con
         .make = [&to = *device, &of = *volume,
                  options](const std::stop_token &stop) { return make_soon(to, of, options, stop); },
         .before_use = [&on, &turn = *turns] { turn.take(on.mutex); },
-        .meanwhile_abilities = abilities_on_host(compressed),
-        .make_meanwhile = [&compressed,
-                           host_options] { return make_on_host(compressed, host_options); },
+        .meanwhile_abilities = abilities_on_host(compressed, options.field != nullptr),
+        .make_meanwhile =
+            [&compressed, host_options, field = options.field] {
+              HostRendererOptions with_field = host_options;
+              with_field.field = field;
+              return make_on_host(compressed, with_field);
+            },
     });
     core::SoonRenderer *const soon = renderer.get();
     auto result =
         make_implementation(turns, std::move(device), std::move(volume), std::move(renderer));
     result->soon = soon;
+    result->field = options.field;
     return Renderer(std::move(result));
   });
 }

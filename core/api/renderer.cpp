@@ -1,5 +1,6 @@
 #include "isowave/renderer.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <mutex>
 #include <utility>
@@ -10,6 +11,7 @@
 #include "core/api/renderer_implementation.hpp"
 #include "core/api/volume_implementation.hpp"
 #include "core/base/ms_since.hpp"
+#include "core/frame/colors.hpp"
 #include "core/io/file_name.hpp"
 #include "core/zfp/isovalue.hpp"
 
@@ -75,7 +77,7 @@ Frame Renderer::Implementation::draw(const FrameRequest &request) {
   const auto begin = std::chrono::steady_clock::now();
   check_wanted(request, renderer_->abilities());
   core::FrameRequest wanted = core_request(request, volume_);
-  ProgressOf progress(*renderer_, core_appearance(request.appearance));
+  ProgressOf progress(*renderer_, core_appearance(request.appearance, whole()));
   if (request.on_pass) {
     wanted.on_pass = [&](const core::PassStats &pass) {
       return progress.show(pass, request.on_pass);
@@ -104,11 +106,28 @@ Frame Renderer::Implementation::draw(const FrameRequest &request) {
   return frame;
 }
 
+namespace {
+
+std::optional<std::array<double, 2>> range_of_colors(
+    const core::Appearance &appearance, const std::optional<std::array<float, 2>> &field_range) {
+  if (appearance.color_by) return std::array{appearance.color_by->low, appearance.color_by->high};
+  if (!appearance.color_by_field || !field_range) return std::nullopt;
+  return std::array{appearance.color_by_field->low.value_or((*field_range)[0]),
+                    appearance.color_by_field->high.value_or((*field_range)[1])};
+}
+
+}  // namespace
+
 /// Gets what the request wants of the frame that was drawn, except bounds.
 void Renderer::Implementation::fetch(const FrameRequest &request, Frame &frame) {
   const core::WantedArrays wanted{request.want_picture, request.want_depth, request.want_normals,
-                                  request.want_positions};
-  move_arrays(renderer_->fetch(wanted, core_appearance(request.appearance)), frame);
+                                  request.want_positions, request.want_field};
+  // Without a picture, nothing needs colours, nor the values that they are by.
+  core::Appearance appearance = core_appearance(request.appearance, whole());
+  if (!renderer_->has_field_values()) appearance.color_by_field.reset();
+  move_arrays(renderer_->fetch(wanted, appearance), frame);
+  if (renderer_->has_field_values()) frame.statistics.field_range = renderer_->field_range();
+  frame.statistics.color_range = range_of_colors(appearance, frame.statistics.field_range);
   if (request.want_hits)
     frame.hits = public_hits(renderer_->hits(), volume_, renderer_->abilities().levels);
 }
@@ -125,12 +144,19 @@ Frame Renderer::Implementation::cast_rays(std::span<const Ray> rays, double isov
   });
 }
 
-Camera Renderer::Implementation::camera(double isovalue, std::optional<ImageSize> size) {
+std::vector<Camera> Renderer::Implementation::turntable(std::span<const double> isovalues,
+                                                        std::uint32_t num_views,
+                                                        std::optional<ImageSize> size) {
   return guarded("looking for the surface", [&] {
+    if (num_views == 0 || num_views > core::kMostViews)
+      throw core::Error("a turntable of {} views: give 1 to {}", num_views, core::kMostViews);
     const std::lock_guard lock(*turns_);
-    const float drawn = core::drawn_isovalue(volume_, isovalue);
-    return public_camera(
-        renderer_->camera({&drawn, 1}, size ? std::optional(core_size(*size)) : std::nullopt));
+    const core::Camera first =
+        renderer_->camera(core::drawn_isovalues(volume_, isovalues),
+                          size ? std::optional(core_size(*size)) : std::nullopt, num_views);
+    std::vector<Camera> cameras(num_views);
+    std::ranges::transform(core::turntable(first, num_views), cameras.begin(), public_camera);
+    return cameras;
   });
 }
 
@@ -168,7 +194,16 @@ Frame Renderer::cast_rays(std::span<const Ray> rays, double isovalue, Normals no
   return implementation_->cast_rays(rays, isovalue, normals);
 }
 Camera Renderer::camera(double isovalue, std::optional<ImageSize> size) {
-  return implementation_->camera(isovalue, size);
+  return implementation_->turntable({&isovalue, 1}, 1, size).front();
+}
+Camera Renderer::camera(const std::vector<Surface> &surfaces, std::optional<ImageSize> size) {
+  return turntable(surfaces, 1, size).front();
+}
+std::vector<Camera> Renderer::turntable(const std::vector<Surface> &surfaces,
+                                        std::uint32_t num_views, std::optional<ImageSize> size) {
+  std::vector<double> isovalues(surfaces.size());
+  std::ranges::transform(surfaces, isovalues.begin(), &Surface::isovalue);
+  return implementation_->turntable(isovalues, num_views, size);
 }
 bool Renderer::can_draw(const FrameRequest &request) const {
   return implementation_->can_draw(request);
@@ -229,6 +264,14 @@ std::array<ClipPlane, 6> box_planes(const Vector3 &begin, const Vector3 &end) {
                            });
     return planes;
   });
+}
+
+std::array<float, 3> parse_color(std::string_view text) {
+  return guarded("reading a colour", [&] { return from_glm(core::parse_color(text)); });
+}
+
+std::array<float, 3> surface_color(std::size_t index) {
+  return from_glm(core::surface_color(index));
 }
 
 void save_png(const Frame &frame, const std::filesystem::path &path) {

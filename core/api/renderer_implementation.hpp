@@ -38,7 +38,8 @@ struct Renderer::Implementation {
 
   Frame render(const FrameRequest &request);
   Frame cast_rays(std::span<const Ray> rays, double isovalue, Normals normals);
-  Camera camera(double isovalue, std::optional<ImageSize> size);
+  std::vector<Camera> turntable(std::span<const double> isovalues, std::uint32_t num_views,
+                                std::optional<ImageSize> size);
   bool can_draw(const FrameRequest &request) const;
   bool ready() const { return soon == nullptr || soon->ready(); }
   bool ready_for(const FrameRequest &request) const;
@@ -52,13 +53,17 @@ struct Renderer::Implementation {
   const LastFrame &last() const { return last_; }
 
   std::shared_ptr<Device> device{};
-  std::shared_ptr<const Volume> volume{};
+  std::shared_ptr<const Volume> volume{}, field{};
   DeviceInfo device_info{};
   Grid grid{};
   std::vector<std::string> notices{};
   core::SoonRenderer *soon = nullptr;  ///< the renderer, if it is one
 
  private:
+  /// The whole volume's finest level, without waiting until a device is ready.
+  core::VolumeInfo whole() {
+    return renderer_->team().size() > 1 ? renderer_->levels().front() : volume_.info;
+  }
   Frame draw(const FrameRequest &request);
   void fetch(const FrameRequest &request, Frame &frame);
   /// For other threads, that may ask while a frame is drawn.

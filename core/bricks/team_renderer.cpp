@@ -11,6 +11,7 @@
 #include "core/base/error.hpp"
 #include "core/base/ms_since.hpp"
 #include "core/bricks/ranks.hpp"
+#include "core/frame/ambient_rays.hpp"
 #include "core/frame/surface_camera.hpp"
 #include "core/view/detail.hpp"
 
@@ -71,14 +72,16 @@ FrameStats TeamRenderer::render(const FrameRequest &request) {
   num_hits_.reset();
   has_whole_ = false;
   FrameRequest own = request;
-  own.ambient_rays = 0;
+  own.ambient_rays = own.shadow_rays = 0;
   FrameStats stats;
-  if (request.on_pass) {
+  if (!request.surfaces.empty()) {
+    draw_layers(own, stats);
+  } else if (request.on_pass) {
     stats = render_in_step(own);
   } else {
     together(team_, [&] { stats = renderer_.render(own); });
   }
-  if (request.ambient_rays != 0 && !stats.cancelled) add_ambient(request, stats);
+  if (light_rays_of(request).count() != 0 && !stats.cancelled) add_ambient(request, stats);
   stats.complete = !stats.cancelled;
   return stats;
 }
@@ -126,11 +129,12 @@ FrameStats TeamRenderer::render_in_step(const FrameRequest &request) {
   return stats;
 }
 
-Camera TeamRenderer::camera(std::span<const float> isovalues, std::optional<ImageSize> size) {
+Camera TeamRenderer::camera(std::span<const float> isovalues, std::optional<ImageSize> size,
+                            std::uint32_t num_views) {
   std::optional<BlockBox> own;
   together(team_, [&] { own = renderer_.surface_box(isovalues); });
   return surface_camera(whole_levels_.front(), gather_box(team_, brick_, own),
-                        size.value_or(abilities().largest));
+                        size.value_or(abilities().largest), num_views);
 }
 
 /// The kept picture may fill own hits, but not those of all bricks.
@@ -153,7 +157,8 @@ void TeamRenderer::add_ambient(const FrameRequest &request, FrameStats &stats) {
     placed = renderer_.placed_hits();
   });
   const std::vector<HitRecord> hits = compose_hits(placed, kHitFields, Receiver::kAll);
-  OpenCounts open{std::vector<uchar>(hits.size()), 0};
+  const LightRays light_rays = light_rays_of(request);
+  OpenCounts open{std::vector<uchar>((light_rays.num_shadow != 0 ? 2 : 1) * hits.size())};
   together(team_, [&] {
     const std::vector<FrameParams> frames =
         make_level_frames(std::span(whole_levels_).first(num_levels_), request.camera,
@@ -165,18 +170,19 @@ void TeamRenderer::add_ambient(const FrameRequest &request, FrameStats &stats) {
                              static_cast<std::size_t>(end - frames.begin())});
   });
   has_whole_ = true;
-  for (std::uint32_t round = 0; round < request.ambient_rays && !stats.cancelled; ++round) {
+  for (std::uint32_t round = 0; round < light_rays.count() && !stats.cancelled; ++round) {
     std::vector<std::uint64_t> blocked;
-    together(team_,
-             [&] { blocked = renderer_.blocked_rays(round, request.ambient_rays, stats.ambient); });
+    together(team_, [&] { blocked = renderer_.blocked_rays(round, light_rays, stats.ambient); });
     const auto [make, take] = in_place(blocked);
     reduce(blocked.size(), Reduction::kOr, Receiver::kRank0, make, take);
-    open.num_ambient = round + 1;
+    const bool is_shadow = round >= light_rays.num_ambient;
+    ++(is_shadow ? open.num_shadow : open.num_ambient);
+    uchar *const counts = open.counts.data() + (is_shadow ? hits.size() : 0);
     for (std::size_t ray = 0; ray < hits.size(); ++ray) {
       const bool is_open = std::isfinite(hits[ray].t) && (blocked[ray / 64] >> ray % 64 & 1) == 0;
-      open.counts[ray] = static_cast<uchar>(open.counts[ray] + is_open);
+      counts[ray] = static_cast<uchar>(counts[ray] + is_open);
     }
-    const bool is_last = open.num_ambient == request.ambient_rays;
+    const bool is_last = round + 1 == light_rays.count();
     if (!is_last && !request.on_pass) continue;
     together(team_, [&] {
       renderer_.set_open(open);

@@ -20,6 +20,12 @@ struct CompositionStats {
   double ms = 0;                            ///< wall clock, with the wait for slower ranks
 };
 
+/// Numbers of hits of rays, in layers.
+struct HitCounts {
+  std::vector<std::uint16_t> before;  ///< [rays] in bricks before this rank's
+  std::vector<std::uint16_t> all;     ///< [rays] in all bricks
+};
+
 /// Draws the whole volume by the bricks of all ranks.
 class TeamRenderer : public Renderer {
  public:
@@ -44,7 +50,8 @@ class TeamRenderer : public Renderer {
   Team &team() override { return team_; }
   std::vector<VolumeInfo> levels() const override { return whole_levels_; }
 
-  /// Draws this rank's brick. Ambient rays go through the bricks of all ranks.
+  /// Draws this rank's brick. Ambient rays go through the bricks of all ranks. Hits of several
+  /// surfaces are blended on rank 0, in the order of the bricks.
   ///
   /// request  All ranks have an on_pass, or none. It is called at all ranks after each pass of any
   ///          rank, may ask for the picture so far, and must return the same at all ranks.
@@ -58,7 +65,8 @@ class TeamRenderer : public Renderer {
                                    Normals normals) override {
     return renderer_.cast_rays(rays, isovalue, normals);
   }
-  Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {}) override;
+  Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {},
+                std::uint32_t num_views = 1) override;
 
   ImageSize size() const override { return renderer_.size(); }
   /// Puts together colours; with several rays a pixel it puts together hits, which rank 0 shades.
@@ -82,6 +90,10 @@ class TeamRenderer : public Renderer {
  private:
   void check_levels(const FrameRequest &request) const;
   FrameStats render_in_step(const FrameRequest &request);
+  void draw_layers(const FrameRequest &request, FrameStats &stats);
+  HitCounts count_hits(std::span<const std::vector<RayHit>> layers);
+  LayerStats compose_layers(const FrameRequest &request,
+                            std::span<const std::vector<RayHit>> layers);
   void add_ambient(const FrameRequest &request, FrameStats &stats);
   void reduce(std::size_t count, Reduction how, Receiver who, const MakeWords &make,
               const TakeWords &take);

@@ -1,8 +1,10 @@
 #pragma once
 // Shading of hits: a headlight, Blinn-Phong, and a light above it, on the hits' gradients.
 
+#include <array>
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <optional>
 #include <vector>
 
 #include "core/io/png.hpp"
@@ -10,6 +12,24 @@
 #include "kernels_cl/portable/shade.h"
 
 namespace isowave::core {
+
+/// Colours of a map, from low to high: words, red in bits 0..7, green 8..15, blue 16..23.
+using ColorTable = std::array<uint, ISO_MAP_COLORS>;
+
+/// Colours of surfaces by the distance along an axis: that of a point from the world's origin.
+struct ColorByAxis {
+  glm::dvec3 axis{0, 0, 1};  ///< world space, of any length above 0
+  double low = 0, high = 1;  ///< distances of the first and the last colour [world units]
+  ColorTable colors{};
+};
+
+/// Colours of surfaces by the values of a field at the hits (FrameRequest::field_values). Hits
+/// without a value have the surface's own colour.
+struct ColorByField {
+  /// Values of the first and the last colour; none: the least and the largest at the frame's hits.
+  std::optional<double> low{}, high{};
+  ColorTable colors{};
+};
 
 /// Colours and lights. Colours are display values, [0,1].
 struct Appearance {
@@ -22,27 +42,81 @@ struct Appearance {
   /// Pictures are RGBA with straight alpha: the share of a pixel's rays that hit, and the mean
   /// colour of those alone; 0 0 0 0 if none hits. There is no background.
   bool transparent = false;
+  std::optional<ColorByAxis> color_by{};         ///< instead of `surface`
+  std::optional<ColorByField> color_by_field{};  ///< the same; at most one of the two
+  /// Direction towards a light of the scene, in world space, of any length above 0. `above` is then
+  /// its weight.
+  std::optional<glm::dvec3> towards_light{};
+  /// The background goes linearly from `background` at the picture's lower edge to this one at the
+  /// upper; none: it is uniform.
+  std::optional<glm::vec3> background_top{};
 };
 
-/// The number of ambient rays of each hit that met nothing.
+/// What shading needs.
+struct Shading {
+  // NOLINTNEXTLINE(google-explicit-constructor): without a colour map
+  Shading(const ShadeParams &of) : params(of) {}
+  Shading(const ShadeParams &of, const ColorTable &map) : params(of), color_map(map) {}
+
+  ShadeParams params;
+  ColorTable color_map{};
+};
+
+/// The numbers of ambient and shadow rays of each hit that met nothing.
 struct OpenCounts {
-  std::vector<uchar> counts;      ///< [height * width] by ray
+  std::vector<uchar> counts;      ///< [height * width] by ray; [2] with shadow rays
   std::uint32_t num_ambient = 0;  ///< ambient rays of each hit; 0: there are none
+  std::uint32_t num_shadow = 0;   ///< shadow rays of each hit; 0: there are none
 };
 
 /// Stores GLM's columns as rows [9], scaled so that the largest entry is 1: only directions count.
 void store_rows(const glm::dmat3 &m, float *rows);
 
+/// Throws  Error: a range that is empty or not finite; an axis without a direction
+void check_color_by(const ColorByAxis &color_by);
+/// Throws  Error: the direction is none
+void check_light(const std::optional<glm::dvec3> &towards_light);
+/// Throws  Error: a range that is empty or not finite
+void check_color_by_field(const ColorByField &color_by);
+
+/// The distances along an axis that a volume's box has: low, high.
+std::array<double, 2> range_along(const VolumeInfo &info, const glm::dvec3 &axis);
+
 ShadeParams make_shade_params(const VolumeInfo &info, const Appearance &appearance);
+/// field_range  values of a field at the frame's hits, for ends that ColorByField does not give
+/// Throws       Error: as check_color_by()
+Shading make_shading(const VolumeInfo &info, const Appearance &appearance,
+                     const std::optional<std::array<float, 2>> &field_range = {});
+
+/// RGB, or RGBA if transparent, of a frame's pixels.
+///
+/// samples  rays per pixel along each axis
+/// Pixel    (uint column, uint row) -> RGBA, red in bits 0..7
+template <class Pixel>
+Image8 image_of_pixels(const FrameParams &frame, const ShadeParams &params, std::uint32_t samples,
+                       Pixel pixel_at) {
+  const std::uint32_t columns = frame.view.width / samples, rows = frame.view.height / samples;
+  const std::uint32_t channels = num_channels(&params);
+  Image8 image{columns, rows, channels,
+               std::vector<std::uint8_t>(std::size_t{channels} * columns * rows)};
+  for (uint pixel = 0; pixel < columns * rows; ++pixel) {
+    const uint rgba = pixel_at(pixel % columns, pixel / columns);
+    for (uint channel = 0; channel < channels; ++channel)
+      image.pixels[std::size_t{channels} * pixel + channel] =
+          static_cast<std::uint8_t>(rgba >> 8 * channel);
+  }
+  return image;
+}
 
 /// The picture of a frame, made on the host with the bits of a device's (kernels_cl/shade.cl).
 ///
 /// hits     [height * width] hits of the frame's rays
 /// samples  rays per pixel along each axis
-/// open     open ambient rays of the hits
+/// open     open ambient rays of the hits, and lit shadow rays
+/// field_values  [height * width] of a field, if colours are by it
 /// Returns  RGB, or RGBA if transparent
-Image8 shade_scalar(const FrameParams &frame, const ShadeParams &params,
+Image8 shade_scalar(const FrameParams &frame, const Shading &shading,
                     const std::vector<HitRecord> &hits, std::uint32_t samples = 1,
-                    const OpenCounts &open = {});
+                    const OpenCounts &open = {}, const std::vector<float> &field_values = {});
 
 }  // namespace isowave::core

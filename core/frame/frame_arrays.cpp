@@ -18,12 +18,7 @@ HitMap make_hit_map(std::span<const VolumeInfo> levels) {
   HitMap map{};
   map.map = make_world_map(levels.front());
   map.is_float32 = float32_holds_positions(levels.front()) ? 1 : 0;
-  const std::vector<FrameParams> grids = make_level_grids(levels);
-  map.blocks_x = grids.front().place.blocks_x;
-  map.blocks_y = grids.front().place.blocks_y;
-  map.num_levels = static_cast<uint>(grids.size());
-  for (std::size_t level = 0; level < grids.size(); ++level)
-    map.begin_z[level] = grids[level].place.begin_z;
+  set_level_places(levels, map);
   return map;
 }
 

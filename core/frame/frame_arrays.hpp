@@ -17,6 +17,7 @@ namespace isowave::core {
 /// The arrays of a frame that its caller wants.
 struct WantedArrays {
   bool picture = false, depth = false, normals = false, positions = false;
+  bool field_values = false;  ///< of a frame with FrameRequest::field_values
 };
 
 /// Arrays of one frame; those that were not wanted are empty. Rays are [rows][columns], row 0 at
@@ -27,6 +28,7 @@ struct FrameArrays {
   HostArray<float> depth;                      ///< see HitRecord::t
   HostArray<std::array<float, 3>> normals;     ///< see world_normal()
   HostArray<std::array<double, 3>> positions;  ///< see hit_position()
+  HostArray<float> field_values;               ///< see field_value.h; NaN: none
 };
 
 /// Throws  std::logic_error: the picture of a sample of rays (ImageSize::stride) is wanted

@@ -8,6 +8,7 @@
 
 #include "core/frame/frame_stats.hpp"
 #include "core/frame/normals.hpp"
+#include "core/frame/surfaces.hpp"
 #include "core/view/camera.hpp"
 #include "core/view/clip.hpp"
 #include "core/view/frame.hpp"
@@ -34,6 +35,13 @@ struct FrameRequest {
   float isovalue = 0;
   std::optional<ImageSize> size{};  ///< none: the renderer's largest
   Clip clip{};                      ///< the part of the volume that is drawn
+  /// Surfaces that are drawn instead of that of `isovalue`, blended front to back. Empty: that one
+  /// alone, opaque.
+  std::vector<SurfaceStyle> surfaces{};
+  Slices slices{};  ///< beside surfaces
+  /// The light of surfaces[]: passes blend it. Renderer::fetch() adds the background. Shadow rays
+  /// go to its light.
+  Appearance light{};
   /// Largest distance between voxels of a coarser level of detail [pixels], see
   /// make_level_frames(); 0: the finest level draws all.
   double voxel_pixels = 0;
@@ -46,9 +54,16 @@ struct FrameRequest {
   /// error.
   FieldBound bound = FieldBound::kNone;
   Normals normals = Normals::kSmooth;  ///< gradients of the hits; nothing else depends on them
+  /// Whether hits get values of the renderer's field, for Appearance::color_by_field.
+  bool field_values = false;
+  bool field_on_caps = false;  ///< hits that are no caps have no value
   /// Rays from each hit that find out how much of the sky it sees, for shading
   /// (kernels_cl/portable/ambient.h); 0: each hit sees all of it.
   std::uint32_t ambient_rays = 0;
+  /// Rays from each hit towards light.towards_light, for its shadows; 0: it casts none. A single
+  /// ray gives hard shadows; several are spread over a cone around that direction, for soft ones.
+  std::uint32_t shadow_rays = 0;
+  double light_angle = 3;  ///< of the cone, from its axis [degrees], up to 45
   /// Largest distance to the true surface [pixels]. voxel_pixels and voxel_error are then chosen so
   /// that most pixels keep it. The true surface is that of the volume before compression, or by
   /// sample that of full detail.

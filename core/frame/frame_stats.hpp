@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "core/frame/surfaces.hpp"
 #include "core/view/frame.hpp"
 #include "kernels_cl/portable/shared_types.h"
 
@@ -29,7 +30,8 @@ struct PassStats {
       stage_ms;  ///< by stage; empty unless the device was opened with profiling
 };
 
-/// Statistics of the passes after those that found the hits: for normals, or for ambient rays.
+/// Statistics of the passes after those that found the hits: normals, behind hits, a field, and
+/// ambient and shadow rays.
 struct LaterPasses {
   std::uint32_t passes = 0;
   std::uint64_t decoded_blocks = 0;        ///< blocks decoded in these passes
@@ -106,15 +108,18 @@ struct DetailChoice {
 struct FrameStats {
   std::vector<PassStats> passes;                ///< passes that looked for hits
   LaterPasses normals;                          ///< passes for Normals::kSmooth
-  LaterPasses ambient;                          ///< passes of ambient rays
+  LaterPasses behind;                           ///< passes of rays behind their first hits
+  LaterPasses field;                            ///< passes for values of a field
+  LaterPasses ambient;                          ///< passes of ambient and shadow rays
   std::size_t first_level = 0, last_level = 0;  ///< levels of detail that drew; 0: the finest
   double total_ms = 0;  ///< wall clock, from camera to finished hit buffer on the device
   std::uint64_t rays_hit = 0;
+  LayerStats layers{};                ///< with FrameRequest::surfaces
   std::uint64_t uploaded_blocks = 0;  ///< from a compressed volume on the host ...
   std::uint64_t uploaded_bytes = 0;   ///< ... and their bytes
   /// Whether on_pass stopped the frame before the picture was finished. The hit buffer then holds
   /// the picture so far. If the last of `passes` has left no rays, the picture has all hits, some
-  /// with the gradients of their cells, or with fewer ambient rays.
+  /// with the gradients of their cells, or with fewer ambient and shadow rays.
   bool cancelled = false;
   bool complete = true;                  ///< false: cancelled, or the time budget was over
   std::vector<TimedStep> steps{};        ///< with a time budget: in the order of drawing

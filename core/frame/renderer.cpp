@@ -15,6 +15,23 @@ namespace {
 void check_choices(const FrameRequest &request) {
   if (!request.clip.planes.empty() && request.bound != FieldBound::kNone)
     throw Error("a bound of the field is drawn whole: leave out clip");
+  if (!request.surfaces.empty()) {
+    const bool has_slices = !request.slices.planes.empty();
+    const auto leave_out = [&](bool is_given, const char *what) {
+      if (is_given)
+        throw Error("{0} are drawn without {1}: leave out {1}",
+                    has_slices ? "slices" : "several or translucent surfaces", what);
+    };
+    leave_out(request.bound != FieldBound::kNone, "bound");
+    leave_out(request.voxel_pixels != 0, "voxel_pixels");
+    leave_out(request.ambient_rays != 0, "ambient_rays");
+    leave_out(request.shadow_rays != 0, "shadow_rays");
+    leave_out(request.field_values, "colours by a field");
+    leave_out(request.max_surface_error.has_value(), "max_surface_error");
+    leave_out(request.time_budget_ms.has_value(), "time_budget_ms");
+  }
+  if (request.field_values && request.time_budget_ms)
+    throw Error("colours by a field are drawn without a time budget: leave out one of the two");
   if (!request.max_surface_error) {
     if (request.by == Evidence::kSample)
       throw Error("a sample is evidence for max_surface_error: give max_surface_error");
@@ -50,7 +67,10 @@ void check(const FrameRequest &request, const Abilities &abilities) {
   check_voxel_pixels(request.voxel_pixels);
   with_fewer_planes({}, request.voxel_error);  // or throws
   check_ambient_rays(request.ambient_rays);
+  check_light(request.light.towards_light);
+  check_shadow_rays(request);
   check_clip(request.clip);
+  check_surfaces(request.surfaces, request.slices);
   if (request.max_surface_error) check_max_surface_error(*request.max_surface_error);
   if (request.time_budget_ms) check_time_budget(*request.time_budget_ms);
   check_choices(request);
@@ -65,6 +85,23 @@ void check(const FrameRequest &request, const Abilities &abilities) {
        "this renderer draws in perspective alone: leave out parallel projection");
   need(!request.clip.planes.empty(), abilities.clipping,
        "this renderer draws whole volumes alone: leave out clip");
+  need(request.field_values, abilities.field,
+       abilities.cells ? "this renderer has no field to colour by: make it with one"
+                       : "a team draws without colours by a field: leave them out");
+  need(!request.slices.planes.empty(), abilities.cells,
+       "a team draws without slices: leave them out");
+  need(!request.surfaces.empty() && request.on_pass && !abilities.cells, false,
+       "a team draws several or translucent surfaces at once: leave out on_pass");
+  need(!request.slices.planes.empty(), abilities.most_surfaces != 0,
+       "this renderer draws no slices: leave them out, or draw on the host, or on a device by a "
+       "renderer that was made with_surfaces");
+  if (request.surfaces.size() > abilities.most_surfaces)
+    throw Error("{}", abilities.most_surfaces == 0
+                          ? std::string("this renderer draws one opaque surface alone: leave out "
+                                        "surfaces, or draw on the host, or on a device by a "
+                                        "renderer that was made with_surfaces")
+                          : fmt::format("this renderer was made for {} surfaces, and {} are given",
+                                        abilities.most_surfaces, request.surfaces.size()));
   need(request.voxel_pixels > 0, abilities.levels,
        "this renderer draws the finest level of detail alone: leave out voxel_pixels, or draw a "
        "volume with levels on the host, or on a device by a renderer that was made with_levels");
@@ -76,6 +113,8 @@ void check(const FrameRequest &request, const Abilities &abilities) {
        "device by a renderer that was made with_bounds");
   need(request.ambient_rays != 0, abilities.given_rays,
        "ambient rays need a renderer that was made with_rays");
+  need(request.shadow_rays != 0, abilities.given_rays,
+       "shadow rays need a renderer that was made with_rays");
   const bool by_sample = request.by == Evidence::kSample;
   need(request.max_surface_error && !by_sample, abilities.surface_error,
        "this renderer knows no bounds of the error: leave out max_surface_error, judge it by "
@@ -90,6 +129,14 @@ void check(const FrameRequest &request, const Abilities &abilities) {
 Image8 Renderer::shade(const Appearance &appearance) {
   const FrameArrays arrays = fetch({.picture = true}, appearance);
   return arrays.picture.empty() ? Image8{} : image_of(size(), arrays.picture);
+}
+
+Shading Renderer::shading_of(const VolumeInfo &info, const Appearance &appearance) {
+  const auto &by = appearance.color_by_field;
+  if (by && !has_field_values())
+    throw Error("the last frame has no values of a field: ask for field_values");
+  const bool needs_range = by && !(by->low && by->high);
+  return make_shading(info, appearance, needs_range ? field_range() : std::nullopt);
 }
 
 void Renderer::keep_picture() {

@@ -3,6 +3,7 @@
 // twin are renderers: the same request gives the same bits. A time budget or a bound of the error
 // can be added to any of them, by a renderer around another (RendererAround).
 
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <memory>
@@ -26,7 +27,7 @@ struct Abilities {
   bool levels_pay = false;         ///< coarse levels make frames faster on such a device
   bool fewer_planes = false;       ///< FrameRequest::voxel_error
   bool bounds = false;             ///< FrameRequest::bound
-  bool given_rays = false;         ///< FrameRequest::ambient_rays, and cast_rays()
+  bool given_rays = false;         ///< FrameRequest::ambient_rays and shadow_rays, cast_rays()
   bool cells = true;               ///< hits name their cell: HitRecord::block_id
   bool surface_error = false;      ///< FrameRequest::max_surface_error, by proof
   bool sampled_error = false;      ///< FrameRequest::max_surface_error, by sample
@@ -34,6 +35,8 @@ struct Abilities {
   bool kept_picture = false;       ///< keep_picture(), fill_from_kept(), enlarge_kept()
   bool parallel = true;            ///< Camera::parallel_height
   bool clipping = false;           ///< FrameRequest::clip
+  bool field = false;              ///< FrameRequest::field_values
+  std::size_t most_surfaces = 0;   ///< of FrameRequest::surfaces
   Solver solver = kDefaultSolver;  ///< the root finder
 };
 
@@ -80,8 +83,10 @@ class Renderer {
   /// A view in which isosurfaces fill a picture of that size, see surface_camera(); no size: the
   /// largest.
   ///
-  /// Throws  Error: an isovalue is NaN
-  virtual Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {}) = 0;
+  /// num_views  of turntable(). Returns the first of them; the surfaces stay in the picture in all
+  /// Throws     Error: an isovalue is NaN
+  virtual Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {},
+                        std::uint32_t num_views = 1) = 0;
 
   // These functions return the last frame, or within on_pass the frame at work. Rank 0 of a team
   // gets the frame, and other ranks get empty ones. All of them wait, and throw Error if no frame
@@ -89,7 +94,7 @@ class Renderer {
 
   virtual ImageSize size() const = 0;
   /// The wanted arrays, in memory that may serve the next frame's once they are gone. Positions
-  /// need Abilities::cells.
+  /// need Abilities::cells. Shadows are those of the frame's light.
   virtual FrameArrays fetch(const WantedArrays &wanted, const Appearance &appearance) = 0;
   /// RGB, or RGBA if `appearance.transparent`, [size.height][size.width], row 0 at the top.
   Image8 shade(const Appearance &appearance = {});
@@ -97,6 +102,11 @@ class Renderer {
   std::vector<float> depth() { return fetch({.depth = true}, {}).depth.copy(); }
   /// [size.ray_rows()][size.ray_columns()], row 0 at the top.
   virtual std::vector<HitRecord> hits() = 0;
+  /// Whether the last frame had FrameRequest::field_values.
+  virtual bool has_field_values() const { return false; }
+  /// The least and the largest value of the field at the hits of the last frame; none if no hit has
+  /// one.
+  virtual std::optional<std::array<float, 2>> field_range() { return {}; }
   /// Number of rays that hit, for the frame with those statistics.
   virtual std::uint64_t num_hits(const FrameStats &stats) { return stats.rays_hit; }
 
@@ -122,6 +132,10 @@ class Renderer {
 
  protected:
   Renderer() = default;
+  /// make_shading(), with field_range() if the appearance gives no range.
+  ///
+  /// Throws  Error: also colours by a field whose values the last frame does not have
+  Shading shading_of(const VolumeInfo &info, const Appearance &appearance);
 
  private:
   TeamOfOne alone_;
@@ -144,14 +158,17 @@ class RendererAround : public Renderer {
                                    Normals normals) override {
     return inner().cast_rays(rays, isovalue, normals);
   }
-  Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {}) override {
-    return inner().camera(isovalues, size);
+  Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {},
+                std::uint32_t num_views = 1) override {
+    return inner().camera(isovalues, size, num_views);
   }
   ImageSize size() const override { return inner().size(); }
   FrameArrays fetch(const WantedArrays &wanted, const Appearance &appearance) override {
     return inner().fetch(wanted, appearance);
   }
   std::vector<HitRecord> hits() override { return inner().hits(); }
+  bool has_field_values() const override { return inner().has_field_values(); }
+  std::optional<std::array<float, 2>> field_range() override { return inner().field_range(); }
   std::uint64_t num_hits(const FrameStats &stats) override { return inner().num_hits(stats); }
   void keep_picture() override { inner().keep_picture(); }
   void fill_from_kept() override { inner().fill_from_kept(); }

@@ -66,6 +66,7 @@ Renderer &SoonRenderer::find_any() {
 }
 
 FrameStats SoonRenderer::render(const FrameRequest &request) {
+  check(request, parts_.abilities);
   FrameRequest wanted = request;
   wanted.size = size_of(request, parts_.abilities);
   bool is_overtaken = false;
@@ -100,8 +101,9 @@ std::vector<HitRecord> SoonRenderer::cast_rays(std::span<const WorldRay> rays, f
   return hits;
 }
 
-Camera SoonRenderer::camera(std::span<const float> isovalues, std::optional<ImageSize> size) {
-  return find_any().camera(isovalues, size.value_or(parts_.abilities.largest));
+Camera SoonRenderer::camera(std::span<const float> isovalues, std::optional<ImageSize> size,
+                            std::uint32_t num_views) {
+  return find_any().camera(isovalues, size.value_or(parts_.abilities.largest), num_views);
 }
 
 void SoonRenderer::clear_cache() {

@@ -30,7 +30,8 @@ struct SoonParts {
 
 /// Draws by the renderer meanwhile until the other one is ready, and then by the other one. If the
 /// other one becomes ready during a frame, it begins the frame anew (PassStats::begins_anew). A
-/// request that the renderer meanwhile cannot draw waits. If making the other renderer fails, each
+/// request that the other one cannot draw is refused; one that the renderer meanwhile cannot draw
+/// waits. If making the other renderer fails, each
 /// call that needs it throws the error.
 ///
 /// ready(), ready_for(), abilities(), memory_bytes(), wait() and give_up() may be called from any
@@ -61,7 +62,8 @@ class SoonRenderer : public RendererAround {
   FrameStats render(const FrameRequest &request) override;
   std::vector<HitRecord> cast_rays(std::span<const WorldRay> rays, float isovalue,
                                    Normals normals) override;
-  Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {}) override;
+  Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {},
+                std::uint32_t num_views = 1) override;
   void clear_cache() override;
   /// Memory of the renderer that took long, after its last call; 0 before it is ready.
   std::uint64_t memory_bytes() const override { return is_ready_ ? memory_bytes_.load() : 0; }

@@ -12,7 +12,9 @@ namespace isowave::core {
 /// A view in which a box of blocks fills a picture of that size, from the direction in which
 /// orbit_cameras() begins.
 ///
-/// box  the box around the blocks that the surface may be in; none: the whole volume
-Camera surface_camera(const VolumeInfo &info, const std::optional<BlockBox> &box, ImageSize size);
+/// box        the box around the blocks that the surface may be in; none: the whole volume
+/// num_views  in each view of turntable(), the box is in the picture
+Camera surface_camera(const VolumeInfo &info, const std::optional<BlockBox> &box, ImageSize size,
+                      std::uint32_t num_views = 1);
 
 }  // namespace isowave::core

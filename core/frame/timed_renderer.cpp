@@ -143,7 +143,7 @@ FrameRequest TimedRenderer::request_of(const FrameRequest &request, std::size_t 
   smaller.size = halved(full, static_cast<unsigned>(step));
   if (step != 0) {
     smaller.voxel_pixels = std::max(levels_pay_ ? 1.0 : 0.0, request.voxel_pixels / scale);
-    smaller.ambient_rays = 0;
+    smaller.ambient_rays = smaller.shadow_rays = 0;
   }
   return smaller;
 }

@@ -23,8 +23,8 @@ constexpr std::uint64_t kRunBlocks = 1024;
 constexpr std::uint64_t kRunMacrocells = 1024;
 constexpr std::uint32_t kEdge = ISO_MACROCELL_BLOCKS;
 
-/// How far a block is, in decoded_ and opened_. In opened_, numbers from kFirstSelection on: it is
-/// open for that selection; for any other it is as if it were kNone.
+/// How far a block is, in decoded_ and Selection::opened. In the latter, numbers from
+/// kFirstSelection on: it is open for that number; for any other it is as if it were kNone.
 constexpr uchar kNone = 0, kBeingMade = 1, kFirstSelection = 2;
 static_assert(HostField::kDecoded > kBeingMade);
 
@@ -89,9 +89,15 @@ HostBlocks::Pages::Pages(std::uint64_t num_bytes)
 std::uint64_t HostBlocks::bytes(const VolumeInfo &info) {
   const BlockGrid grid = make_grid(info);
   const std::uint64_t num_blocks = block_count(grid), macrocells = num_macrocells(grid);
-  return macrocells * (65 * sizeof(BlockRange) + sizeof(ulong)) + 2 * num_blocks +
-         num_pages(num_blocks * ISO_BLOCK_VOXELS * sizeof(float)) +
-         num_pages(num_blocks * sizeof(ulong)) + kNumThresholds * sizeof(float);
+  return macrocells * 65 * sizeof(BlockRange) + num_blocks +
+         num_pages(num_blocks * ISO_BLOCK_VOXELS * sizeof(float)) + kNumThresholds * sizeof(float) +
+         bytes_per_isovalue(info);
+}
+
+std::uint64_t HostBlocks::bytes_per_isovalue(const VolumeInfo &info) {
+  const BlockGrid grid = make_grid(info);
+  const std::uint64_t num_blocks = block_count(grid);
+  return num_macrocells(grid) * sizeof(ulong) + num_blocks + num_pages(num_blocks * sizeof(ulong));
 }
 
 std::uint64_t HostBlocks::ray_bytes() {
@@ -114,17 +120,22 @@ HostBlocks::HostBlocks(const CompressedVolume &volume, HostRoom &room, std::uint
       num_threads_(num_threads),
       blocks_(volume.num_blocks()),
       macrocells_((blocks_ + kEdge - 1u) / kEdge),
-      masks_(num_macrocells(make_grid(volume.info))),
+      num_macrocells_(num_macrocells(make_grid(volume.info))),
       values_(volume.block_count() * ISO_BLOCK_VOXELS * sizeof(float)),
-      changing_(volume.block_count() * sizeof(ulong)),
       decoded_(volume.block_count()),
-      opened_(volume.block_count()),
-      decoded_as_(volume),
-      selection_(kFirstSelection) {
+      decoded_as_(volume) {
+  selections_.push_back(std::make_unique<Selection>(*this));
   find_ranges();
   room.hold(bytes(volume.info));
   room.add([this] { drop(); });
 }
+
+HostBlocks::Selection::Selection(HostBlocks &blocks)
+    : of(&blocks),
+      masks(blocks.num_macrocells_),
+      changing(blocks.decoded_.size() * sizeof(ulong)),
+      opened(blocks.decoded_.size()),
+      number(kFirstSelection) {}
 
 /// As far as decode() needs it, in host memory.
 EncodedBlock HostBlocks::encoded(std::size_t block) const {
@@ -146,10 +157,10 @@ EncodedBlock HostBlocks::encoded(std::size_t block) const {
 /// Layer by layer of blocks, since a block's dual cells have voxels of the layer above it.
 void HostBlocks::find_ranges() {
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
-  ranges_.low.assign(64 * masks_.size(), kInfinity);
-  ranges_.high.assign(64 * masks_.size(), -kInfinity);
-  macrocell_ranges_.low.assign(masks_.size(), kInfinity);
-  macrocell_ranges_.high.assign(masks_.size(), -kInfinity);
+  ranges_.low.assign(64 * num_macrocells_, kInfinity);
+  ranges_.high.assign(64 * num_macrocells_, -kInfinity);
+  macrocell_ranges_.low.assign(num_macrocells_, kInfinity);
+  macrocell_ranges_.high.assign(num_macrocells_, -kInfinity);
   std::vector<float> sampled(2 * range_sample(volume_->block_count()).count);
   std::vector<BlockRange> layer(8 * std::size_t{blocks_.x} * blocks_.y), above(layer.size());
   ranges_of_layer(0, layer, sampled);
@@ -237,10 +248,10 @@ template <class Holds>
 std::optional<BlockBox> HostBlocks::box_of(Holds holds) const {
   std::optional<BlockBox> box;
   std::mutex box_mutex;
-  parallel_for((masks_.size() + kRunMacrocells - 1) / kRunMacrocells, num_threads_,
+  parallel_for((num_macrocells_ + kRunMacrocells - 1) / kRunMacrocells, num_threads_,
                [&](std::uint64_t run, std::uint32_t) {
                  std::optional<BlockBox> box_here;
-                 const std::size_t end = std::min(masks_.size(), (run + 1) * kRunMacrocells);
+                 const std::size_t end = std::min(num_macrocells_, (run + 1) * kRunMacrocells);
                  for (std::size_t macrocell = run * kRunMacrocells; macrocell < end; ++macrocell) {
                    const ulong mask = holds(macrocell);
                    if (mask == 0) continue;
@@ -259,7 +270,7 @@ std::optional<BlockBox> HostBlocks::box_of(Holds holds) const {
 void HostBlocks::decode_as(const HostValues &values) {
   if (decoded_as_ == values) return;
   decoded_as_ = values;
-  selected_.reset();
+  for (const auto &selection : selections_) selection->isovalue.reset();
   forget();
 }
 
@@ -311,29 +322,43 @@ ulong HostBlocks::blocks_that_hold(std::size_t macrocell, float isovalue) const 
   return mask;
 }
 
+void HostBlocks::select(std::span<const float> isovalues) {
+  const std::uint64_t bytes_of_one = bytes_per_isovalue(volume_->info);
+  while (selections_.size() > isovalues.size()) {
+    release(selections_.back()->changing);
+    selections_.pop_back();
+    room_->give_back(bytes_of_one);
+  }
+  while (selections_.size() < isovalues.size()) {
+    selections_.push_back(std::make_unique<Selection>(*this));
+    room_->hold(bytes_of_one);
+  }
+  for (std::size_t i = 0; i < isovalues.size(); ++i) select(*selections_[i], isovalues[i]);
+}
+
 /// A block has cells that change if its dual cells have voxels on both sides: any two of these
 /// voxels are connected by cells of the block, so that one of the cells has both. A block that is
 /// not active is on the side of its values of all planes, too.
-void HostBlocks::select(float isovalue) {
-  if (selected_ == isovalue) return;
-  selected_.reset();
-  if (++selection_ == 0) {
-    fill(opened_, kNone);
-    selection_ = kFirstSelection;
+void HostBlocks::select(Selection &selection, float isovalue) {
+  if (selection.isovalue == isovalue) return;
+  selection.isovalue.reset();
+  if (++selection.number == 0) {
+    fill(selection.opened, kNone);
+    selection.number = kFirstSelection;
   }
   const std::optional<BlockBox> box = box_of([&](std::size_t macrocell) {
-    return masks_[macrocell] = blocks_that_hold(macrocell, isovalue);
+    return selection.masks[macrocell] = blocks_that_hold(macrocell, isovalue);
   });
   const BlockBox around = box.value_or(BlockBox{glm::ivec3(0), glm::ivec3(0)});
-  surface_ = {.isovalue = isovalue,
-              .isovalue_index = 0,
-              .active_begin_x = around.begin.x,
-              .active_begin_y = around.begin.y,
-              .active_begin_z = around.begin.z,
-              .active_end_x = around.end.x,
-              .active_end_y = around.end.y,
-              .active_end_z = around.end.z};
-  selected_ = isovalue;
+  selection.surface = {.isovalue = isovalue,
+                       .isovalue_index = 0,
+                       .active_begin_x = around.begin.x,
+                       .active_begin_y = around.begin.y,
+                       .active_begin_z = around.begin.z,
+                       .active_end_x = around.end.x,
+                       .active_end_y = around.end.y,
+                       .active_end_z = around.end.z};
+  selection.isovalue = isovalue;
 }
 
 /// macrocell_masks() takes a block as active whose range, rounded outward to thresholds, has values
@@ -361,25 +386,26 @@ std::array<float, 2> HostBlocks::extremes() const {
 // ---- Blocks, when rays come to them
 //
 // A block's values are written only by the thread that sets decoded_ from kNone to kBeingMade; the
-// thread releases kDecoded afterwards. A thread that acquires kDecoded may read the values. opened_
-// guards changing() in the same way. A thread acquires kDecoded of the eight blocks of the dual
-// grid before it releases opened_. So a thread that acquires opened_ may read the values of all
-// eight, even if other threads wrote them. Between two calls of run(), no other thread is at work:
-// parallel_for() has joined.
+// thread releases kDecoded afterwards. A thread that acquires kDecoded may read the values. A
+// selection's `opened` guards its `changing` in the same way. A thread acquires kDecoded of the
+// eight blocks of the dual grid before it releases `opened`. So a thread that acquires `opened` may
+// read the values of all eight, even if other threads wrote them. Between two calls of run(), no
+// other thread is at work: parallel_for() has joined.
 
-HostField HostBlocks::field() {
+HostField HostBlocks::field(std::size_t selection) {
+  Selection &of = *selections_.at(selection);
   return {.values = values(),
-          .changing = changing(),
-          .masks = masks_.data(),
+          .changing = of.changing_cells(),
+          .masks = of.masks.data(),
           .highs = ranges_.high.data(),
           .has_gaps = !volume_->no_data.empty(),
           .decoded = decoded_.data(),
-          .opened = opened_.data(),
-          .selection = selection_,
-          .maker = this};
+          .opened = of.opened.data(),
+          .selection = of.number,
+          .maker = &of};
 }
 
-void HostBlocks::open(std::size_t block) {
+void HostBlocks::open(Selection &selection, std::size_t block) {
   const glm::uvec3 place = place_of(block, blocks_);
   std::array<std::size_t, 8> dual_grid;
   // Beyond the volume, any voxels do: they matter to cells outside it alone.
@@ -387,8 +413,8 @@ void HostBlocks::open(std::size_t block) {
     dual_grid[corner] = block_at(glm::min(place + corner_of(corner), blocks_ - 1u));
   room_->with_room([&] {
     for (const std::size_t id : dual_grid) decode_once(id);
-    take_page(changing_, block * sizeof(ulong));
-    find_changing(block, dual_grid);
+    take_page(selection.changing, block * sizeof(ulong));
+    find_changing(selection, block, dual_grid);
   });
 }
 
@@ -445,10 +471,12 @@ void HostBlocks::decode_to(std::size_t block, float *values) const {
 }
 
 /// Finds the cells of the block that change, from the values of its decoded dual grid.
-void HostBlocks::find_changing(std::size_t block, std::span<const std::size_t, 8> dual_grid) {
-  std::atomic<uchar> &state = opened_[block];
+void HostBlocks::find_changing(Selection &selection, std::size_t block,
+                               std::span<const std::size_t, 8> dual_grid) {
+  std::atomic<uchar> &state = selection.opened[block];
+  const float isovalue = selection.surface.isovalue;
   uchar seen = state.load(std::memory_order_acquire);
-  while (seen != selection_) {
+  while (seen != selection.number) {
     if (seen == kBeingMade) {
       state.wait(kBeingMade, std::memory_order_acquire);
       seen = state.load(std::memory_order_acquire);
@@ -458,10 +486,10 @@ void HostBlocks::find_changing(std::size_t block, std::span<const std::size_t, 8
     ulong inside[8];
     for (uint corner = 0; corner < 8; ++corner) {
       inside[corner] =
-          host_loops().inside(values() + ISO_BLOCK_VOXELS * dual_grid[corner], surface_.isovalue);
+          host_loops().inside(values() + ISO_BLOCK_VOXELS * dual_grid[corner], isovalue);
     }
-    changing()[block] = changing_cells(inside);
-    seen = selection_;
+    selection.changing_cells()[block] = changing_cells(inside);
+    seen = selection.number;
     state.store(seen, std::memory_order_release);
     state.notify_all();
   }
@@ -483,13 +511,14 @@ bool HostBlocks::is_decoded(std::size_t block) const {
 
 void HostBlocks::forget() {
   fill(decoded_, kNone);
-  fill(opened_, kNone);
+  for (const auto &selection : selections_) fill(selection->opened, kNone);
 }
 
 /// Forgets what is decoded, and gives its memory back.
 void HostBlocks::drop() {
   forget();
-  for (Pages *pages : {&values_, &changing_}) release(*pages);
+  release(values_);
+  for (const auto &selection : selections_) release(selection->changing);
 }
 
 void HostBlocks::release(Pages &pages) {

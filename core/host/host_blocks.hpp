@@ -42,10 +42,12 @@ struct HostValues {
 };
 
 /// The blocks of a volume. Not thread-safe, except the functions that rays call (BlockMaker).
-class HostBlocks final : private BlockMaker {
+class HostBlocks {
  public:
-  /// Memory of a volume with this grid if nothing is decoded.
+  /// Memory of a volume with this grid if nothing is decoded, for one isovalue.
   static std::uint64_t bytes(const VolumeInfo &info);
+  /// Memory of each further isovalue.
+  static std::uint64_t bytes_per_isovalue(const VolumeInfo &info);
   /// Room for the blocks that a single ray needs at a time.
   static std::uint64_t ray_bytes();
   /// The least limit.
@@ -70,12 +72,18 @@ class HostBlocks final : private BlockMaker {
   /// Finds the blocks that may have cells whose corners are not all on one side of an isovalue, for
   /// field() and surface(). Does nothing if the isovalue is in use. Other cells cannot have a hit
   /// (cell_intersect.h), so rays may skip them. Decoded blocks stay.
-  void select(float isovalue);
+  void select(float isovalue) { select({&isovalue, 1}); }
+  /// The same for several isovalues at once, one or more. All fields have the same decoded blocks.
+  void select(std::span<const float> isovalues);
 
   /// The field that rays walk through, within run(). Stays valid until the next select().
-  HostField field();
-  /// The selected isovalue, and the box around the blocks that may have such a cell.
-  const Surface &surface() const { return surface_; }
+  ///
+  /// selection  which of the isovalues that were selected
+  HostField field(std::size_t selection = 0);
+  /// A selected isovalue, and the box around the blocks that may have such a cell.
+  const Surface &surface(std::size_t selection = 0) const {
+    return selections_.at(selection)->surface;
+  }
 
   /// As HostRoom::run().
   ///
@@ -115,16 +123,35 @@ class HostBlocks final : private BlockMaker {
     std::vector<float> low, high;
   };
 
+  /// The blocks that an isovalue crosses, and of those that are open, the cells that change.
+  struct Selection final : BlockMaker {
+    explicit Selection(HostBlocks &blocks);
+    void open(std::size_t block) override { of->open(*this, block); }
+    void decode(std::span<const std::size_t> blocks) override { of->decode(blocks); }
+
+    ulong *changing_cells() const { return static_cast<ulong *>(changing.memory.data()); }
+
+    HostBlocks *of;
+    std::vector<ulong> masks;  ///< as in HostField
+    Pages changing;            ///< [block]
+    std::vector<std::atomic<uchar>> opened;
+    uchar number;
+    std::optional<float> isovalue;
+    Surface surface{};
+  };
+
   HostBlocks(const CompressedVolume &volume, std::unique_ptr<HostRoom> room,
              std::uint32_t num_threads);
-  void open(std::size_t block) override;
-  void decode(std::span<const std::size_t> blocks) override;
+  void select(Selection &selection, float isovalue);
+  void open(Selection &selection, std::size_t block);
+  void decode(std::span<const std::size_t> blocks);
   void drop();
   void release(Pages &pages);
   void take_page(Pages &pages, std::uint64_t byte);
   void decode_once(std::size_t block);
   void decode_to(std::size_t block, float *values) const;
-  void find_changing(std::size_t block, std::span<const std::size_t, 8> dual_grid);
+  void find_changing(Selection &selection, std::size_t block,
+                     std::span<const std::size_t, 8> dual_grid);
 
   ulong blocks_that_hold(std::size_t macrocell, float isovalue) const;
   bool may_hold(float low, float high, std::uint32_t bound_code, float isovalue) const;
@@ -142,24 +169,21 @@ class HostBlocks final : private BlockMaker {
     return block.x + blocks_.x * (block.y + std::size_t{blocks_.y} * block.z);
   }
   float *values() const { return static_cast<float *>(values_.memory.data()); }
-  ulong *changing() const { return static_cast<ulong *>(changing_.memory.data()); }
 
   const CompressedVolume *volume_;
   std::unique_ptr<HostRoom> own_room_;
   HostRoom *room_;
   std::uint32_t num_threads_;
   glm::uvec3 blocks_, macrocells_;  ///< numbers of, along each axis
+  std::size_t num_macrocells_;
   DualRanges ranges_;
   DualRanges macrocell_ranges_;  ///< [macrocell]
   std::vector<float> thresholds_;
-  std::vector<ulong> masks_;
-  Pages values_, changing_;  ///< [block][64]; [block]
-  std::vector<std::atomic<uchar>> decoded_, opened_;
+  Pages values_;  ///< [block][64]
+  std::vector<std::atomic<uchar>> decoded_;
   std::atomic<std::uint64_t> num_decoded_ = 0;
   HostValues decoded_as_;
-  uchar selection_;
-  std::optional<float> selected_;
-  Surface surface_{};
+  std::vector<std::unique_ptr<Selection>> selections_;  ///< one or more
 };
 
 }  // namespace isowave::core

@@ -5,8 +5,9 @@
 
 namespace isowave::core {
 
-std::uint64_t HostLevels::least_bytes(const CompressedVolume &volume) {
-  std::uint64_t sum = HostBlocks::ray_bytes();
+std::uint64_t HostLevels::least_bytes(const CompressedVolume &volume, std::size_t num_surfaces) {
+  std::uint64_t sum =
+      HostBlocks::ray_bytes() + (num_surfaces - 1) * HostBlocks::bytes_per_isovalue(volume.info);
   for (const CompressedVolume *level : levels_of(volume, true))
     sum += HostBlocks::bytes(level->info);
   return sum;
@@ -46,6 +47,21 @@ std::vector<HostLevel> HostLevels::open(std::span<const FrameParams> frames, dou
   // If there are several bands, a ray may begin at a border that lies outside the box.
   if (levels.size() == 1) levels[0].frame.screen = make_screen_box(levels[0].frame);
   return levels;
+}
+
+std::vector<HostLevel> HostLevels::open_surfaces(const FrameParams &frame,
+                                                 std::span<const float> isovalues,
+                                                 double voxel_error) {
+  HostBlocks &blocks = blocks_of(0);
+  blocks.decode_as({*volumes_[0], true, voxel_error, FieldBound::kNone, volumes_[0]->value_range});
+  blocks.select(isovalues);
+  std::vector<HostLevel> surfaces;
+  for (std::size_t i = 0; i < isovalues.size(); ++i) {
+    surfaces.push_back({frame, blocks.field(i)});
+    surfaces.back().frame.surface = blocks.surface(i);
+    surfaces.back().frame.screen = make_screen_box(surfaces.back().frame);
+  }
+  return surfaces;
 }
 
 HostBlocks &HostLevels::open_finest(float isovalue) {

@@ -15,7 +15,9 @@ class HostLevels {
  public:
   /// The least limit of the memory: value ranges of all levels, and room for the blocks that a
   /// single ray needs at a time.
-  static std::uint64_t least_bytes(const CompressedVolume &volume);
+  ///
+  /// num_surfaces  most of a frame
+  static std::uint64_t least_bytes(const CompressedVolume &volume, std::size_t num_surfaces = 1);
 
   /// volume        must outlive this
   /// memory_limit  bound on bytes(); at least least_bytes()
@@ -38,6 +40,15 @@ class HostLevels {
   /// Throws   Error: as HostBlocks and value_offset(); the file contradicts itself
   std::vector<HostLevel> open(std::span<const FrameParams> frames, double voxel_error = 0,
                               FieldBound bound = FieldBound::kNone);
+  /// Prepares the finest level for a frame of several surfaces.
+  ///
+  /// frame        of the finest level
+  /// isovalues    one or more; the limit of the memory is at least least_bytes() of so many
+  /// voxel_error  FrameRequest::voxel_error
+  /// Returns  [isovalue] the level with that surface; they stay valid as those of open()
+  /// Throws   Error: as HostBlocks
+  std::vector<HostLevel> open_surfaces(const FrameParams &frame, std::span<const float> isovalues,
+                                       double voxel_error);
   /// Prepares the finest level for rays of any origin: its field is that of all bit planes.
   HostBlocks &open_finest(float isovalue);
 

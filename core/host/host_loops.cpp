@@ -3,6 +3,7 @@
 #include "core/host/host_loops.hpp"
 
 #include "core/host/host_bands.hpp"
+#include "core/host/host_layers.hpp"
 #include "core/host/host_packets.hpp"
 #include "core/host/host_rays.hpp"
 #include "kernels_cl/portable/whole_number.h"
@@ -135,30 +136,46 @@ inline void ambient(const HostLevel &level, const RayTile &tile, const AmbientRa
       if (!is_hit_of(frame, hits[ray_id])) continue;
       const HitRecord placed = placed_hit(&frame, rays.level, hits[ray_id]);
       const uint pattern = ambient_pattern(&frame, ray_id);
-      uint num_open = 0;
+      uint num_open[2] = {0, 0};
       for (uint k = 0; k < rays.num_rays; ++k) {
-        const GivenRay given = ambient_ray(rays.seen, &rays.params, placed, ray_id,
+        const GivenRay given = ambient_ray(rays.seen, &rays.params, placed, ray_id, k,
                                            rays.directions[k * ISO_AMBIENT_PATTERNS + pattern]);
+        if (!is_given(given)) continue;
         const bool meets = kTraceRay(frame, level.field, box, last, make_given_ray(given), &met);
-        num_open += !meets || (level.clip != nullptr && is_clipped(level.clip, given, rays.voxel,
-                                                                   met.t / frame.view.t_scale));
+        num_open[is_shadow_ray(&rays.params, k)] +=
+            !meets || (level.clip != nullptr &&
+                       is_clipped(level.clip, given, rays.voxel, met.t / frame.view.t_scale));
       }
-      open_counts[ray_id] = static_cast<uchar>(num_open);
+      open_counts[ray_id] = static_cast<uchar>(num_open[0]);
+      if (rays.num_rays != rays.params.num_ambient)
+        open_counts[frame.view.width * frame.view.height + ray_id] =
+            static_cast<uchar>(num_open[1]);
     }
   }
 }
 
-inline void shade(const FrameParams &frame, const ShadeParams &params, uint samples, uint row,
+inline void store_pixel(uint rgba, uint channels, std::uint8_t *pixel) {
+  for (uint channel = 0; channel < 3; ++channel)
+    pixel[channel] = static_cast<std::uint8_t>(rgba >> (8 * channel));
+  if (channels == 4) pixel[3] = static_cast<std::uint8_t>(rgba >> 24);
+}
+
+inline void shade(const FrameParams &frame, const Shading &shading, uint samples, uint row,
                   const HitRecord *hits, const uchar *open_counts, uint num_ambient,
-                  std::uint8_t *picture) {
-  const uint columns = frame.view.width / samples, channels = num_channels(&params);
+                  uint num_shadow, const float *field_values, std::uint8_t *picture) {
+  const uint columns = frame.view.width / samples, channels = num_channels(&shading.params);
   for (uint column = 0; column < columns; ++column, picture += channels) {
-    const uint rgba =
-        shade_pixel(&frame, &params, samples, column, row, hits, open_counts, num_ambient);
-    for (uint channel = 0; channel < 3; ++channel)
-      picture[channel] = static_cast<std::uint8_t>(rgba >> (8 * channel));
-    if (channels == 4) picture[3] = static_cast<std::uint8_t>(rgba >> 24);
+    store_pixel(shade_pixel(&frame, &shading.params, shading.color_map.data(), samples, column, row,
+                            hits, open_counts, num_ambient, num_shadow, field_values),
+                channels, picture);
   }
+}
+
+inline void shade_layers(const FrameParams &frame, const ShadeParams &params, uint samples,
+                         uint row, const RayColor *colors, std::uint8_t *picture) {
+  const uint columns = frame.view.width / samples, channels = num_channels(&params);
+  for (uint column = 0; column < columns; ++column, picture += channels)
+    store_pixel(layered_pixel(&frame, &params, samples, column, row, colors), channels, picture);
 }
 
 ISO_WHOLE_LOOP void decode_anywhere(const EncodedBlock &block, float *values) {
@@ -191,11 +208,32 @@ ISO_WHOLE_LOOP void ambient_anywhere(const HostLevel &level, const RayTile &tile
                                      uchar *open_counts) {
   ambient<trace_ray_anywhere>(level, tile, rays, hits, open_counts);
 }
-ISO_WHOLE_LOOP void shade_anywhere(const FrameParams &frame, const ShadeParams &params,
-                                   uint samples, uint row, const HitRecord *hits,
-                                   const uchar *open_counts, uint num_ambient,
+ISO_WHOLE_LOOP void shade_anywhere(const FrameParams &frame, const Shading &shading, uint samples,
+                                   uint row, const HitRecord *hits, const uchar *open_counts,
+                                   uint num_ambient, uint num_shadow, const float *field_values,
                                    std::uint8_t *picture) {
-  shade(frame, params, samples, row, hits, open_counts, num_ambient, picture);
+  shade(frame, shading, samples, row, hits, open_counts, num_ambient, num_shadow, field_values,
+        picture);
+}
+
+ISO_OF_ITS_OWN ISO_WHOLE_LOOP void smooth_hit_anywhere(const HostLevel &level, HitRecord *hit) {
+  smooth_gradient(level.frame, level.field, last_planes(&level.frame), hit);
+}
+ISO_OF_ITS_OWN ISO_WHOLE_LOOP bool trace_ray_behind_anywhere(const HostLevel &surface, uint ray_id,
+                                                             const HitRecord &hit,
+                                                             HitRecord *next) {
+  return trace_ray_behind(surface, ray_id, hit, next);
+}
+ISO_WHOLE_LOOP uint blend_rays_anywhere(std::span<const HostLevel> surfaces, const LayerBlend &by,
+                                        const RayTile &tile, HitRecord *next, HitRecord *hits,
+                                        RayColor *colors, LayerStats *stats) {
+  return blend<trace_rays_behind<trace_ray_behind_anywhere>, smooth_hit_anywhere>(
+      surfaces, by, tile, next, hits, colors, stats);
+}
+ISO_WHOLE_LOOP void shade_layers_anywhere(const FrameParams &frame, const ShadeParams &params,
+                                          uint samples, uint row, const RayColor *colors,
+                                          std::uint8_t *picture) {
+  shade_layers(frame, params, samples, row, colors, picture);
 }
 
 /// One level is a special case of several.
@@ -254,10 +292,40 @@ ISO_WIDE_LOOP void ambient_wide(const HostLevel &level, const RayTile &tile,
                                 uchar *open_counts) {
   ambient<trace_ray_wide>(level, tile, rays, hits, open_counts);
 }
-ISO_WIDE_LOOP void shade_wide(const FrameParams &frame, const ShadeParams &params, uint samples,
+ISO_WIDE_LOOP void shade_wide(const FrameParams &frame, const Shading &shading, uint samples,
                               uint row, const HitRecord *hits, const uchar *open_counts,
-                              uint num_ambient, std::uint8_t *picture) {
-  shade(frame, params, samples, row, hits, open_counts, num_ambient, picture);
+                              uint num_ambient, uint num_shadow, const float *field_values,
+                              std::uint8_t *picture) {
+  shade(frame, shading, samples, row, hits, open_counts, num_ambient, num_shadow, field_values,
+        picture);
+}
+ISO_OF_ITS_OWN ISO_WIDE_LOOP void smooth_hit_wide(const HostLevel &level, HitRecord *hit) {
+  smooth_gradient(level.frame, level.field, last_planes(&level.frame), hit);
+}
+ISO_OF_ITS_OWN ISO_WIDE_LOOP bool trace_ray_behind_wide(const HostLevel &surface, uint ray_id,
+                                                        const HitRecord &hit, HitRecord *next) {
+  return trace_ray_behind(surface, ray_id, hit, next);
+}
+ISO_OF_ITS_OWN ISO_WIDE_LOOP bool trace_ray_in_cell_wide(const HostLevel &surface, uint ray_id,
+                                                         const HitRecord &hit, HitRecord *next) {
+  return trace_ray_in_cell(surface, ray_id, hit, next);
+}
+ISO_WIDE_LOOP uint blend_wide(std::span<const HostLevel> surfaces, const LayerBlend &by,
+                              const RayTile &tile, HitRecord *next, HitRecord *hits,
+                              RayColor *colors, LayerStats *stats) {
+  return blend<trace_packets_behind<trace_ray_in_cell_wide, trace_packet_behind>, smooth_hit_wide>(
+      surfaces, by, tile, next, hits, colors, stats);
+}
+ISO_WIDE_LOOP uint blend_rays_wide(std::span<const HostLevel> surfaces, const LayerBlend &by,
+                                   const RayTile &tile, HitRecord *next, HitRecord *hits,
+                                   RayColor *colors, LayerStats *stats) {
+  return blend<trace_rays_behind<trace_ray_behind_wide>, smooth_hit_wide>(surfaces, by, tile, next,
+                                                                          hits, colors, stats);
+}
+ISO_WIDE_LOOP void shade_layers_wide(const FrameParams &frame, const ShadeParams &params,
+                                     uint samples, uint row, const RayColor *colors,
+                                     std::uint8_t *picture) {
+  shade_layers(frame, params, samples, row, colors, picture);
 }
 
 uint trace_sse4(const FrameParams &frame, const HostField &field, const RayTile &tile,
@@ -271,6 +339,16 @@ uint trace_levels_sse4(std::span<const HostLevel> levels, const RayTile &tile, b
   return smoothed<smooth_anywhere>(
       trace_levels<trace_band_packet_sse4, side_anywhere>(levels, tile, hits), levels, tile,
       is_smooth, hits);
+}
+ISO_OF_ITS_OWN ISO_WHOLE_LOOP bool trace_ray_in_cell_anywhere(const HostLevel &surface, uint ray_id,
+                                                              const HitRecord &hit,
+                                                              HitRecord *next) {
+  return trace_ray_in_cell(surface, ray_id, hit, next);
+}
+uint blend_sse4(std::span<const HostLevel> surfaces, const LayerBlend &by, const RayTile &tile,
+                HitRecord *next, HitRecord *hits, RayColor *colors, LayerStats *stats) {
+  return blend<trace_packets_behind<trace_ray_in_cell_anywhere, trace_packet_behind_sse4>,
+               smooth_hit_anywhere>(surfaces, by, tile, next, hits, colors, stats);
 }
 
 /// With fused multiply-add, single rays are faster.
@@ -288,13 +366,16 @@ bool is_wide() {
 constexpr HostLoops kLoops[] = {
     {decode_anywhere, ranges_anywhere, inside_anywhere, trace_rays<trace_rays_of_levels_anywhere>,
      trace_rays<trace_rays_of_levels_anywhere>, trace_rays_of_levels_anywhere,
-     trace_rays_of_levels_anywhere, cast_anywhere, ambient_anywhere, shade_anywhere},
+     trace_rays_of_levels_anywhere, cast_anywhere, ambient_anywhere, shade_anywhere,
+     blend_rays_anywhere, blend_rays_anywhere, shade_layers_anywhere},
 #ifdef ISO_HAS_WIDE_LOOPS
     {decode_anywhere, ranges_anywhere, inside_anywhere, trace_sse4,
      trace_rays<trace_rays_of_levels_anywhere>, trace_levels_sse4, trace_rays_of_levels_anywhere,
-     cast_anywhere, ambient_anywhere, shade_anywhere},
+     cast_anywhere, ambient_anywhere, shade_anywhere, blend_sse4, blend_rays_anywhere,
+     shade_layers_anywhere},
     {decode_wide, ranges_wide, inside_wide, trace_wide, trace_rays<trace_rays_of_levels_wide>,
-     trace_levels_wide, trace_rays_of_levels_wide, cast_wide, ambient_wide, shade_wide},
+     trace_levels_wide, trace_rays_of_levels_wide, cast_wide, ambient_wide, shade_wide, blend_wide,
+     blend_rays_wide, shade_layers_wide},
 #endif
 };
 

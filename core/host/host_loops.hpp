@@ -8,10 +8,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <vector>
 
+#include "core/frame/appearance.hpp"
+#include "core/frame/surfaces.hpp"
 #include "core/view/given_rays.hpp"
 #include "kernels_cl/portable/ambient.h"
 #include "kernels_cl/portable/clip.h"
+#include "kernels_cl/portable/layers.h"
 #include "kernels_cl/portable/ray_state.h"
 #include "kernels_cl/portable/shade.h"
 
@@ -107,14 +111,24 @@ struct RayTile {
   uint begin_x, begin_y, end_x, end_y;  ///< of the frame's rays
 };
 
-/// The ambient rays of a frame's hits in one level of detail.
+/// The ambient and shadow rays of a frame's hits in one level of detail.
 struct AmbientRays {
   AmbientParams params;
   const AmbientDirection *directions;  ///< [num_rays][ISO_AMBIENT_PATTERNS]
-  uint num_rays;                       ///< of each hit
+  uint num_rays;                       ///< of each hit, both
   const FrameParams *seen;             ///< the frame of the finest level that draws
   uint level;                          ///< of the hits, counted from that one
   float voxel;                         ///< of the level [voxels of the finest level]
+};
+
+/// How the surfaces of a frame are blended.
+struct LayerBlend {
+  Shading shading;
+  LayerParams colors;
+  std::vector<std::uint32_t> numbers;  ///< innermost_first()
+  bool is_smooth;                      ///< Normals::kSmooth
+  ClipParams clip;                     ///< of slices
+  FieldMap slice_map;                  ///< from hits on slices to the volume
 };
 
 struct HostLoops {
@@ -150,17 +164,35 @@ struct HostLoops {
   void (*cast)(const FrameParams &frame, const HostField &field, const IndexRay *rays,
                uint num_rays, bool is_smooth, HitRecord *hits);
   /// Counts the ambient rays of a tile's hits in a level of detail that meet nothing in that level,
-  /// or what is clipped, into open_counts [height * width].
+  /// or what is clipped, into open_counts [height * width], and such shadow rays behind them.
   void (*ambient)(const HostLevel &level, const RayTile &tile, const AmbientRays &rays,
                   const HitRecord *hits, uchar *open_counts);
   /// Shades a row of the picture of the frame's hits [height * width].
   ///
   /// samples      rays per pixel along each axis
-  /// open_counts  [height * width] open rays among num_ambient; num_ambient 0: there are none
+  /// open_counts, num_ambient, num_shadow  as shade_pixel()
+  /// field_values [height * width] of the field; not read unless colours are by it
   /// picture      [width / samples][num_channels()]
-  void (*shade)(const FrameParams &frame, const ShadeParams &params, uint samples, uint row,
-                const HitRecord *hits, const uchar *open_counts, uint num_ambient,
-                std::uint8_t *picture);
+  void (*shade)(const FrameParams &frame, const Shading &shading, uint samples, uint row,
+                const HitRecord *hits, const uchar *open_counts, uint num_ambient, uint num_shadow,
+                const float *field_values, std::uint8_t *picture);
+  /// Blends a tile's hits on surfaces with those behind them, eight rays at a time if the processor
+  /// can.
+  ///
+  /// surfaces  [surface] innermost first
+  /// next      [ray of the tile][surface] their first hits, with gradients of cells; overwritten
+  /// Out       of the tile's rays, hits [height * width]: the first layer, of rays that hit
+  ///           something; colors [height * width]
+  ///           *stats: what is blended is added
+  /// Returns   number of rays that hit something
+  uint (*blend)(std::span<const HostLevel> surfaces, const LayerBlend &by, const RayTile &tile,
+                HitRecord *next, HitRecord *hits, RayColor *colors, LayerStats *stats);
+  /// The same, ray by ray.
+  uint (*blend_rays)(std::span<const HostLevel> surfaces, const LayerBlend &by, const RayTile &tile,
+                     HitRecord *next, HitRecord *hits, RayColor *colors, LayerStats *stats);
+  /// As shade(), of blended rays. colors: [height * width]
+  void (*shade_layers)(const FrameParams &frame, const ShadeParams &params, uint samples, uint row,
+                       const RayColor *colors, std::uint8_t *picture);
 };
 
 /// The loops that this processor can run, the fastest last.

@@ -41,6 +41,10 @@ uint trace_band_packet(const HostLevel &level, uint x, uint y, uint lanes, HitRe
                        BandSides *sides) {
   return packets_avx2::trace_band(level, x, y, lanes, hits, sides);
 }
+void trace_packet_behind(const HostLevel &surface, uint x, uint y, uint lanes, uint capped,
+                         const HitRecord *hits, HitRecord *next) {
+  packets_avx2::trace_behind(surface, x, y, lanes, capped, hits, next);
+}
 
 }  // namespace isowave::core
 #endif

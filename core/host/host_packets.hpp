@@ -39,11 +39,21 @@ struct BandSides {
 uint trace_band_packet(const HostLevel &level, uint x, uint y, uint lanes, HitRecord *hits,
                        BandSides *sides);
 
+/// Traces some of eight rays on from their hits on a surface to their next cell with a crossing.
+///
+/// lanes, capped  bit column + 4 row: rays whose hits are crossings, and caps
+/// hits           [8]
+/// Out            next [8], of rays that hit something there
+void trace_packet_behind(const HostLevel &surface, uint x, uint y, uint lanes, uint capped,
+                         const HitRecord *hits, HitRecord *next);
+
 /// The same, for processors with sse4.1 and popcnt.
 uint trace_packets_sse4(const FrameParams &frame, const HostField &field, const RayTile &tile,
                         HitRecord *hits);
 uint trace_band_packet_sse4(const HostLevel &level, uint x, uint y, uint lanes, HitRecord *hits,
                             BandSides *sides);
+void trace_packet_behind_sse4(const HostLevel &surface, uint x, uint y, uint lanes, uint capped,
+                              const HitRecord *hits, HitRecord *next);
 
 }  // namespace isowave::core
 #endif

@@ -40,6 +40,10 @@ uint trace_band_packet_sse4(const HostLevel &level, uint x, uint y, uint lanes, 
                             BandSides *sides) {
   return packets_sse4::trace_band(level, x, y, lanes, hits, sides);
 }
+void trace_packet_behind_sse4(const HostLevel &surface, uint x, uint y, uint lanes, uint capped,
+                              const HitRecord *hits, HitRecord *next) {
+  packets_sse4::trace_behind(surface, x, y, lanes, capped, hits, next);
+}
 
 }  // namespace isowave::core
 #endif

@@ -74,16 +74,10 @@ inline void smooth_gradient(const FrameParams &frame, const HostField &field, La
   hit->grad_z = derivatives[2];
 }
 
-/// The first hit of a ray in a block's changing cells, within its interval. enter: by which it
-/// enters the block.
-inline bool trace_block(const FrameParams &frame, const HostField &field, const Ray &ray,
-                        const GridWalk &block, RayEvent enter, LastPlanes last, HitRecord *hit) {
-  const BlockCoords b = {static_cast<uint>(block.x), static_cast<uint>(block.y),
-                         static_cast<uint>(block.z)};
-  const std::size_t block_number = level_block_at(&frame, b.x, b.y, b.z);
-  field.open(block_number);
-  const ulong changing = field.changing[block_number];
-  CellWalk at = enter_cells(&ray, b, enter, last);
+/// The first hit of a ray in a block's changing cells from `at` on, within its interval.
+inline bool trace_cells(const FrameParams &frame, const HostField &field, const Ray &ray,
+                        std::size_t block, CellWalk at, LastPlanes last, HitRecord *hit) {
+  const ulong changing = field.changing[block];
   do {
     if (passes_border(at.exit, ray.end_t)) at.exit = border_event(ray.end_t);
     if ((changing >> cell_in_block(&at.cell) & 1u) == 0) continue;
@@ -97,6 +91,16 @@ inline bool trace_block(const FrameParams &frame, const HostField &field, const 
     return true;
   } while (at.exit.axis != ISO_AXIS_START && next_cell(&at, &ray, last));
   return false;
+}
+
+/// The first hit of a ray in a block. enter: by which it enters the block.
+inline bool trace_block(const FrameParams &frame, const HostField &field, const Ray &ray,
+                        const GridWalk &block, RayEvent enter, LastPlanes last, HitRecord *hit) {
+  const BlockCoords b = {static_cast<uint>(block.x), static_cast<uint>(block.y),
+                         static_cast<uint>(block.z)};
+  const std::size_t block_number = level_block_at(&frame, b.x, b.y, b.z);
+  field.open(block_number);
+  return trace_cells(frame, field, ray, block_number, enter_cells(&ray, b, enter, last), last, hit);
 }
 
 /// The block of a macrocell that the ray is in just after `enter`, by which it entered that.
@@ -131,43 +135,71 @@ inline ActiveBox active_box(const Surface &surface, LastPlanes last) {
            (surface.active_end_z - 1) / kBlocks}};
 }
 
-/// The first hit of a ray in its interval in a level. Walks from macrocell to macrocell, in those
-/// with an active block from block to block, and in active blocks from cell to cell.
-inline bool walk_ray(const FrameParams &frame, const HostField &field, const ActiveBox &box,
-                     LastPlanes last, const Ray &ray, HitRecord *hit) {
-  constexpr int kVoxels = 4 * ISO_MACROCELL_BLOCKS;
+constexpr int kMacrocellVoxels = 4 * ISO_MACROCELL_BLOCKS;
+
+/// The bits of a macrocell's blocks.
+inline ulong macrocell_mask(const FrameParams &frame, const HostField &field,
+                            const GridWalk &macrocell) {
   const uint columns = (frame.grid.blocks_x + 3) / 4, rows = (frame.grid.blocks_y + 3) / 4;
-  RayEvent enter = border_event(ray.begin_t), exit = border_event(ray.end_t);
-  if (!clip_to_box(&ray, box.begin, box.end, &enter, &exit)) return false;
-  GridWalk coarse =
-      walk_from(&ray, locate(ray.x, 0, enter, kVoxels, box.first.x, box.final.x),
-                locate(ray.y, 1, enter, kVoxels, box.first.y, box.final.y),
-                locate(ray.z, 2, enter, kVoxels, box.first.z, box.final.z), kVoxels, last);
+  return field.masks[static_cast<ulong>(macrocell.x) +
+                     columns * (static_cast<ulong>(macrocell.y) +
+                                static_cast<ulong>(rows) * static_cast<ulong>(macrocell.z))];
+}
+
+/// How a walk through a part of the volume ends.
+enum class WalkEnd { kHit, kNoHit, kLeft };
+
+/// Walks from block to block of a macrocell, `block` the first.
+///
+/// enter    by which the ray enters that block; Out: by which it leaves the macrocell
+/// Returns  kNoHit: its interval ends before that
+inline WalkEnd walk_blocks(const FrameParams &frame, const HostField &field, LastPlanes last,
+                           const Ray &ray, const GridWalk &macrocell, ulong mask, GridWalk block,
+                           RayEvent *enter, HitRecord *hit) {
+  for (;;) {
+    if ((mask >> cell_in_block(&block) & 1u) != 0 &&
+        trace_block(frame, field, ray, block, *enter, last, hit))
+      return WalkEnd::kHit;
+    *enter = walk_exit(&block, &ray);
+    if (passes_border(*enter, ray.end_t)) return WalkEnd::kNoHit;
+    if (leaves(&block, &macrocell, *enter)) return WalkEnd::kLeft;
+    walk_step(&block, &ray, *enter, 4, last);
+  }
+}
+
+/// Walks from macrocell to macrocell, `coarse` the first, in those with an active block from block
+/// to block, and in active blocks from cell to cell.
+///
+/// enter  by which the ray enters that macrocell
+inline bool walk_macrocells(const FrameParams &frame, const HostField &field, const ActiveBox &box,
+                            LastPlanes last, const Ray &ray, GridWalk coarse, RayEvent enter,
+                            HitRecord *hit) {
   while (coarse.x >= box.first.x && coarse.x <= box.final.x && coarse.y >= box.first.y &&
          coarse.y <= box.final.y && coarse.z >= box.first.z && coarse.z <= box.final.z) {
-    const ulong mask =
-        field.masks[static_cast<ulong>(coarse.x) +
-                    columns * (static_cast<ulong>(coarse.y) +
-                               static_cast<ulong>(rows) * static_cast<ulong>(coarse.z))];
+    const ulong mask = macrocell_mask(frame, field, coarse);
     if (mask == 0) {
-      exit = walk_exit(&coarse, &ray);
-      if (passes_border(exit, ray.end_t)) return false;
+      enter = walk_exit(&coarse, &ray);
+      if (passes_border(enter, ray.end_t)) return false;
     } else {
-      GridWalk block = enter_macrocell(ray, coarse, enter, last);
-      for (bool left = false; !left; enter = exit) {
-        if ((mask >> cell_in_block(&block) & 1u) != 0 &&
-            trace_block(frame, field, ray, block, enter, last, hit))
-          return true;
-        exit = walk_exit(&block, &ray);
-        if (passes_border(exit, ray.end_t)) return false;
-        left = leaves(&block, &coarse, exit) != 0;
-        walk_step(&block, &ray, exit, 4, last);
-      }
+      const WalkEnd end = walk_blocks(frame, field, last, ray, coarse, mask,
+                                      enter_macrocell(ray, coarse, enter, last), &enter, hit);
+      if (end != WalkEnd::kLeft) return end == WalkEnd::kHit;
     }
-    walk_step(&coarse, &ray, exit, kVoxels, last);
-    enter = exit;
+    walk_step(&coarse, &ray, enter, kMacrocellVoxels, last);
   }
   return false;
+}
+
+/// The first hit of a ray in its interval in a level.
+inline bool walk_ray(const FrameParams &frame, const HostField &field, const ActiveBox &box,
+                     LastPlanes last, const Ray &ray, HitRecord *hit) {
+  RayEvent enter = border_event(ray.begin_t), exit = border_event(ray.end_t);
+  if (!clip_to_box(&ray, box.begin, box.end, &enter, &exit)) return false;
+  const GridWalk first = walk_from(
+      &ray, locate(ray.x, 0, enter, kMacrocellVoxels, box.first.x, box.final.x),
+      locate(ray.y, 1, enter, kMacrocellVoxels, box.first.y, box.final.y),
+      locate(ray.z, 2, enter, kMacrocellVoxels, box.first.z, box.final.z), kMacrocellVoxels, last);
+  return walk_macrocells(frame, field, box, last, ray, first, enter, hit);
 }
 
 }  // namespace isowave::core

@@ -4,11 +4,14 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <mutex>
+#include <utility>
 
 #include "core/base/error.hpp"
 #include "core/base/ms_since.hpp"
 #include "core/base/parallel_for.hpp"
 #include "core/frame/ambient_rays.hpp"
+#include "core/frame/field_values.hpp"
 #include "core/frame/surface_camera.hpp"
 #include "core/platform/memory.hpp"
 #include "core/view/detail.hpp"
@@ -34,21 +37,32 @@ std::uint64_t limit_of(std::uint64_t memory_limit) {
   return memory_limit != 0 ? memory_limit : platform::host_memory() / 4;
 }
 
-/// The memory limit, if the volume can be drawn within it.
-std::uint64_t checked_limit(const CompressedVolume &volume, const HostRendererOptions &options) {
-  const std::uint64_t needed = HostLevels::least_bytes(volume),
-                      limit = limit_of(options.memory_limit);
+/// Returns the memory limit. Throws Error if frames of num_surfaces surfaces need more.
+std::uint64_t checked_limit(const CompressedVolume &volume, std::uint64_t memory_limit,
+                            std::size_t num_surfaces, std::uint64_t field_bytes = 0) {
+  const std::uint64_t needed = HostLevels::least_bytes(volume, num_surfaces) + field_bytes,
+                      limit = limit_of(memory_limit);
   if (needed <= limit) return limit;
   throw Error(
-      "drawing on the host takes {} MiB of memory at least, for value ranges of all blocks, and {} "
-      "MiB are allowed: raise the limit, or draw on a device",
-      mebibytes(needed), limit >> 20);
+      "drawing {}on the host takes {} MiB of memory at least, for value ranges of all blocks, and "
+      "{} MiB are allowed: raise the limit, or draw on a device",
+      num_surfaces == 1 ? "" : fmt::format("{} surfaces ", num_surfaces), mebibytes(needed),
+      limit >> 20);
 }
 
 /// The part of a tile in which rays may hit something.
 RayTile within(const RayTile &tile, const ScreenBox &box) {
   return {std::max(tile.begin_x, box.begin_x), std::max(tile.begin_y, box.begin_y),
           std::min(tile.end_x, box.end_x), std::min(tile.end_y, box.end_y)};
+}
+
+/// Clips levels or surfaces of a frame. screen: of its whole volume.
+void clip_levels(std::span<HostLevel> drawing, const ClipParams &clip, const ScreenBox &screen) {
+  if (clip.num_planes == 0) return;
+  for (HostLevel &level : drawing) {
+    level.clip = &clip;
+    level.frame.screen = screen;  // caps lie outside the box of active blocks, too
+  }
 }
 
 template <class Count>
@@ -59,13 +73,22 @@ Count rounded_up(Count count, std::uint32_t unit) {
 }  // namespace
 
 HostRenderer::HostRenderer(const CompressedVolume &volume, const HostRendererOptions &options)
-    : info_(volume.info),
+    : volume_(volume),
+      info_(volume.info),
       abilities_(abilities_of(volume)),
       num_threads_(options.num_threads),
-      levels_(volume, checked_limit(volume, options), options.num_threads),
-      setup_ms_(ms_since(begin_)) {
+      memory_limit_(options.memory_limit),
+      levels_(volume, checked_limit(volume, memory_limit_, 1), options.num_threads),
+      setup_ms_(0) {
   check_image_size(options.largest);
   abilities_.largest = options.largest;
+  if (options.field != nullptr) {
+    check_volume_info(options.field->info, "the field");
+    checked_limit(volume, memory_limit_, 1, HostBlocks::bytes(options.field->info));
+    field_.emplace(*options.field, levels_.infos(), levels_.room(), num_threads_);
+    abilities_.field = true;
+  }
+  setup_ms_ = ms_since(begin_);
 }
 
 bool HostRenderer::fits(const CompressedVolume &volume, std::uint64_t memory_limit) {
@@ -77,6 +100,7 @@ Abilities HostRenderer::abilities_of(const CompressedVolume &volume) {
   abilities.levels = !volume.coarser_levels.empty();
   abilities.clipping = abilities.fewer_planes = abilities.bounds = abilities.given_rays =
       abilities.kept_picture = true;
+  abilities.most_surfaces = ISO_MAX_SURFACES;
   return abilities;
 }
 
@@ -86,63 +110,141 @@ FrameStats HostRenderer::render(const FrameRequest &request) {
   const ImageSize size = size_of(request, abilities());
   const std::vector<FrameParams> frames = make_level_frames(levels_.infos(), request.camera, size,
                                                             request.isovalue, request.voxel_pixels);
-  std::vector<HostLevel> drawing = levels_.open(frames, request.voxel_error, request.bound);
-  frame_ = frames.front();
-  size_ = size;
-  open_ = {};
   FrameStats stats;
-  stats.first_level =
-      static_cast<std::size_t>(std::ranges::find_if(frames, draws) - frames.begin());
-  stats.last_level = stats.first_level + drawing.size() - 1;
-  const ClipParams clip =
-      make_clip_params(info_, frames.front().view, request.camera, request.clip);
-  if (clip.num_planes != 0) {
-    for (HostLevel &level : drawing) level.clip = &clip;
-    // Caps lie outside the box of active blocks, too.
-    drawing.front().frame.screen = frames[stats.first_level].screen;
-  }
-  try {
-    draw_bands(request, drawing, stats);
-    if (request.ambient_rays != 0 && !stats.cancelled) add_ambient(request, drawing, stats);
-  } catch (...) {
-    hits_.clear();
-    throw;
+  if (request.surfaces.empty()) {
+    draw_one(request, frames, size, stats);
+  } else {
+    draw_surfaces(request, frames.front(), size, stats);
   }
   stats.complete = !stats.cancelled;
   stats.total_ms = ms_since(begin);
   return stats;
 }
 
+/// Calls draw(), which draws another picture. If it throws, there is none.
+template <class Draw>
+void HostRenderer::draw_picture(const FrameParams &frame, ImageSize size,
+                                std::vector<RayColor> colors, Draw draw) {
+  frame_ = frame;
+  size_ = size;
+  open_ = {};
+  field_values_.clear();
+  colors_ = std::move(colors);
+  try {
+    draw();
+  } catch (...) {
+    hits_.clear();
+    colors_.clear();
+    field_values_.clear();
+    throw;
+  }
+}
+
+/// The surface of one isovalue, by levels of detail.
+void HostRenderer::draw_one(const FrameRequest &request, std::span<const FrameParams> frames,
+                            ImageSize size, FrameStats &stats) {
+  std::vector<HostLevel> drawing = levels_.open(frames, request.voxel_error, request.bound);
+  stats.first_level =
+      static_cast<std::size_t>(std::ranges::find_if(frames, draws) - frames.begin());
+  stats.last_level = stats.first_level + drawing.size() - 1;
+  const ClipParams clip =
+      make_clip_params(info_, frames.front().view, request.camera, request.clip);
+  clip_levels(drawing, clip, frames[stats.first_level].screen);
+  const bool is_smooth = request.normals == Normals::kSmooth;
+  draw_picture(frames.front(), size, {}, [&] {
+    draw_bands(
+        request,
+        [&](const RayTile &tile, bool is_alone) {
+          return trace(drawing, tile, is_alone, is_smooth);
+        },
+        stats);
+    if (request.field_values && !stats.cancelled) add_field_values(request, stats);
+    if (light_rays_of(request).count() != 0 && !stats.cancelled)
+      add_ambient(request, drawing, stats);
+  });
+}
+
+/// Several or translucent surfaces: in each tile, first hits on each of them, and then their
+/// layers.
+void HostRenderer::draw_surfaces(const FrameRequest &request, const FrameParams &frame,
+                                 ImageSize size, FrameStats &stats) {
+  checked_limit(volume_, memory_limit_, request.surfaces.size());
+  LayerBlend by{
+      make_shading(info_, request.light),
+      make_layer_params(request.surfaces, request.slices, info_, frame.view, request.camera),
+      innermost_first(request.surfaces),
+      request.normals == Normals::kSmooth,
+      make_clip_params(info_, frame.view, request.camera, request.clip),
+      make_field_map({&info_, 1}, info_)};
+  by.slice_map.first_surface = by.colors.num_surfaces;
+  std::vector<float> isovalues;
+  for (const std::uint32_t number : by.numbers)
+    isovalues.push_back(request.surfaces[number].isovalue);
+  std::vector<HostLevel> surfaces = levels_.open_surfaces(frame, isovalues, request.voxel_error);
+  for (std::size_t k = 0; k < surfaces.size(); ++k) {
+    if (request.surfaces[by.numbers[k]].clipped)
+      clip_levels({&surfaces[k], 1}, by.clip, frame.screen);
+  }
+  std::mutex stats_mutex;
+  const auto draw_tile = [&](const RayTile &tile, bool is_alone) {
+    const std::uint32_t columns = tile.end_x - tile.begin_x,
+                        num_rays = columns * (tile.end_y - tile.begin_y);
+    std::vector<HitRecord> next(num_rays * surfaces.size(), no_hit());
+    for (std::size_t k = 0; k < surfaces.size(); ++k) {
+      if (trace({&surfaces[k], 1}, tile, is_alone, false) == 0) continue;
+      for (std::uint32_t i = 0; i < num_rays; ++i) {
+        const std::size_t ray = tile.begin_x + i % columns +
+                                std::size_t{frame.view.width} * (tile.begin_y + i / columns);
+        next[k + surfaces.size() * i] = std::exchange(hits_[ray], no_hit());
+      }
+    }
+    LayerStats of_tile;
+    const auto blend = is_alone ? host_loops().blend_rays : host_loops().blend;
+    const std::uint64_t num_hits =
+        blend(surfaces, by, tile, next.data(), hits_.data(), colors_.data(), &of_tile);
+    const std::scoped_lock lock(stats_mutex);
+    stats.layers.add(of_tile);
+    return num_hits;
+  };
+  draw_picture(frame, size, std::vector<RayColor>(size.num_rays(), clear_ray()),
+               [&] { draw_bands(request, draw_tile, stats); });
+}
+
+/// Traces a tile's rays, whose hits are no_hit() before.
+std::uint64_t HostRenderer::trace(std::span<const HostLevel> drawing, const RayTile &tile,
+                                  bool is_alone, bool is_smooth) {
+  const HostLevel &first = drawing.front();
+  const RayTile part = within(tile, first.frame.screen);
+  const HostLoops &loops = host_loops();
+  if (is_alone) return loops.trace_rays_of_levels(drawing, part, is_smooth, hits_.data());
+  if (drawing.size() == 1 && first.clip == nullptr)
+    return loops.trace(first.frame, first.field, part, is_smooth, hits_.data());
+  return loops.trace_levels(drawing, part, is_smooth, hits_.data());
+}
+
 /// Band by band, so that the picture so far can be shown; without on_pass, one has all. Each tile
 /// first gets no hits, while it is in the processor's cache; what on_pass may see of others before
 /// that, too.
-void HostRenderer::draw_bands(const FrameRequest &request, std::span<const HostLevel> drawing,
-                              FrameStats &stats) {
+///
+/// draw_tile  (tile, is_alone) -> number of rays that hit something
+template <class DrawTile>
+void HostRenderer::draw_bands(const FrameRequest &request, DrawTile draw_tile, FrameStats &stats) {
   const std::size_t num_rays = std::size_t{frame_.view.width} * frame_.view.height;
+  if (request.field_values) field_values_.assign(num_rays, no_value());
   if (request.on_pass) {
     hits_.assign(num_rays, no_hit());
   } else {
     hits_.resize(num_rays);
   }
   std::atomic<std::uint64_t> num_hits = 0;
-  const HostLevel &first = drawing.front();
-  const bool is_smooth = request.normals == Normals::kSmooth;
   stats.cancelled = !for_bands(
-      request.on_pass, request.ambient_rays != 0,
+      request.on_pass, light_rays_of(request).count() != 0 || request.field_values,
       [&](const RayTile &tile, bool is_alone) {
         for (std::size_t y = tile.begin_y; y < tile.end_y; ++y) {
           const auto row = hits_.begin() + static_cast<std::ptrdiff_t>(y * frame_.view.width);
           std::fill(row + tile.begin_x, row + tile.end_x, no_hit());
         }
-        const RayTile part = within(tile, first.frame.screen);
-        const HostLoops &loops = host_loops();
-        if (is_alone) {
-          num_hits += loops.trace_rays_of_levels(drawing, part, is_smooth, hits_.data());
-        } else if (drawing.size() == 1 && first.clip == nullptr) {
-          num_hits += loops.trace(first.frame, first.field, part, is_smooth, hits_.data());
-        } else {
-          num_hits += loops.trace_levels(drawing, part, is_smooth, hits_.data());
-        }
+        num_hits += draw_tile(tile, is_alone);
       },
       [&](std::uint32_t rows) {
         PassStats pass;
@@ -160,17 +262,21 @@ void HostRenderer::draw_bands(const FrameRequest &request, std::span<const HostL
 void HostRenderer::add_ambient(const FrameRequest &request, std::span<const HostLevel> drawing,
                                FrameStats &stats) {
   const auto begin = std::chrono::steady_clock::now();
-  const std::vector<AmbientDirection> directions = make_ambient_directions(request.ambient_rays);
-  const AmbientParams params = make_ambient_params(levels_.infos()[stats.first_level]);
+  const LightRays light_rays = light_rays_of(request);
+  const std::vector<AmbientDirection> directions = make_light_directions(light_rays);
+  const AmbientParams params =
+      make_ambient_params(levels_.infos()[stats.first_level], light_rays.num_ambient);
   const FrameParams &seen = drawing.front().frame;
-  open_.counts.assign(hits_.size(), static_cast<uchar>(request.ambient_rays));
-  open_.num_ambient = request.ambient_rays;
+  open_ = {{}, light_rays.num_ambient, light_rays.num_shadow};
+  open_.counts.assign(hits_.size(), static_cast<uchar>(light_rays.num_ambient));
+  if (light_rays.num_shadow != 0)
+    open_.counts.resize(2 * hits_.size(), static_cast<uchar>(light_rays.num_shadow));
   stats.cancelled = !for_bands(
       request.on_pass, false,
       [&](const RayTile &tile, bool) {
         for (uint level = 0; level < drawing.size(); ++level) {
           const float voxel = std::ldexp(1.0f, static_cast<int>(stats.first_level + level));
-          const AmbientRays rays{params, directions.data(), request.ambient_rays, &seen, level,
+          const AmbientRays rays{params, directions.data(), light_rays.count(), &seen, level,
                                  voxel};
           host_loops().ambient(drawing[level], within(tile, seen.screen), rays, hits_.data(),
                                open_.counts.data());
@@ -213,6 +319,37 @@ bool HostRenderer::for_bands(const OnPass &on_pass, bool more_follows, Draw draw
   return true;
 }
 
+/// The hits' values of the field, in the same bands.
+void HostRenderer::add_field_values(const FrameRequest &request, FrameStats &stats) {
+  const auto begin = std::chrono::steady_clock::now();
+  stats.cancelled = !for_bands(
+      request.on_pass, light_rays_of(request).count() != 0,
+      [&](const RayTile &tile, bool) {
+        for (std::size_t y = tile.begin_y; y < tile.end_y; ++y) {
+          const std::size_t first = y * frame_.view.width + tile.begin_x;
+          (*field_)(std::span(hits_).subspan(first, tile.end_x - tile.begin_x),
+                    request.field_on_caps, field_values_.data() + first);
+        }
+      },
+      [&](std::uint32_t) {
+        PassStats pass;
+        pass.completed_percent = 100;
+        ++stats.field.passes;
+        return pass;
+      });
+  stats.field.ms = ms_since(begin);
+}
+
+std::optional<std::array<float, 2>> HostRenderer::field_range() {
+  check_has_picture();
+  return range_of_values(field_values_);
+}
+
+void HostRenderer::clear_cache() {
+  levels_.forget();
+  if (field_) field_->forget();
+}
+
 std::vector<HitRecord> HostRenderer::cast_rays(std::span<const WorldRay> rays, float isovalue,
                                                Normals normals) {
   if (std::isnan(isovalue)) throw Error("the isovalue is NaN: give a number");
@@ -232,7 +369,8 @@ std::vector<HitRecord> HostRenderer::cast_rays(std::span<const WorldRay> rays, f
   return hits;
 }
 
-Camera HostRenderer::camera(std::span<const float> isovalues, std::optional<ImageSize> size) {
+Camera HostRenderer::camera(std::span<const float> isovalues, std::optional<ImageSize> size,
+                            std::uint32_t num_views) {
   const ImageSize of_picture = size.value_or(abilities().largest);
   check_image_size(of_picture);
   std::optional<BlockBox> box;
@@ -244,7 +382,7 @@ Camera HostRenderer::camera(std::span<const float> isovalues, std::optional<Imag
     box->begin = glm::min(box->begin, blocks->begin);
     box->end = glm::max(box->end, blocks->end);
   }
-  return surface_camera(info_, box, of_picture);
+  return surface_camera(info_, box, of_picture, num_views);
 }
 
 void HostRenderer::keep_picture() {
@@ -259,6 +397,7 @@ void HostRenderer::enlarge_kept(const FrameRequest &request) {
   frame_ = make_frame_params(info_, request.camera, size, request.isovalue);
   size_ = size;
   open_ = {};
+  field_values_.clear();
   hits_.resize(size.num_rays());
   show_kept(true);
 }
@@ -267,6 +406,7 @@ void HostRenderer::enlarge_kept(const FrameRequest &request) {
 void HostRenderer::show_kept(bool everywhere) {
   check_has_picture();
   if (kept_.empty()) throw Error("there is no picture: none was kept");
+  colors_ = {};
   parallel_for(frame_.view.height, num_threads_, [&](std::uint64_t row, std::uint32_t) {
     const auto first = static_cast<uint>(row * frame_.view.width);
     for (uint ray = first; ray < first + frame_.view.width; ++ray) {
@@ -289,19 +429,30 @@ std::vector<HitRecord> HostRenderer::hits() {
 FrameArrays HostRenderer::fetch(const WantedArrays &wanted, const Appearance &appearance) {
   check_has_picture();
   check_arrays(wanted, size_);
-  const ShadeParams params = make_shade_params(info_, appearance);
+  const Shading shading = shading_of(info_, appearance);
+  const ShadeParams &params = shading.params;
   FrameArrays arrays;
   if (wanted.picture) {
     const std::size_t channels = num_channels(&params);
     arrays.picture = memory_.array<std::uint8_t>(channels * size_.num_pixels());
     parallel_for(size_.height, num_threads_, [&](std::uint64_t row, std::uint32_t) {
-      host_loops().shade(frame_, params, size_.samples, static_cast<uint>(row), hits_.data(),
-                         open_.counts.data(), open_.num_ambient,
-                         arrays.picture.data() + channels * size_.width * row);
+      std::uint8_t *const pixels = arrays.picture.data() + channels * size_.width * row;
+      if (colors_.empty()) {
+        host_loops().shade(frame_, shading, size_.samples, static_cast<uint>(row), hits_.data(),
+                           open_.counts.data(), open_.num_ambient, open_.num_shadow,
+                           field_values_.data(), pixels);
+      } else {
+        host_loops().shade_layers(frame_, params, size_.samples, static_cast<uint>(row),
+                                  colors_.data(), pixels);
+      }
     });
   }
   const HitMap map = make_hit_map(levels());
   add_hit_arrays(wanted, hits_, params, &map, memory_, arrays);
+  if (wanted.field_values) {
+    arrays.field_values = memory_.array<float>(field_values_.size());
+    std::ranges::copy(field_values_, arrays.field_values.begin());
+  }
   return arrays;
 }
 

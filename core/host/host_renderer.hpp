@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "core/frame/renderer.hpp"
+#include "core/host/host_field.hpp"
 #include "core/host/host_levels.hpp"
 
 namespace isowave::core {
@@ -23,7 +24,9 @@ struct HostRendererOptions {
   /// decoded anew, which is slower.
   std::uint64_t memory_limit = 0;
   std::uint32_t num_threads = 0;  ///< 0: one per processor
-  ImageSize largest{};            ///< picture of a request without a size
+  /// A second volume for FrameRequest::field_values; null: none. Must outlive the renderer.
+  const CompressedVolume *field = nullptr;
+  ImageSize largest{};  ///< picture of a request without a size
 };
 
 class HostRenderer : public Renderer {
@@ -45,16 +48,24 @@ class HostRenderer : public Renderer {
   /// Draws one frame. on_pass is called after each band of rows, from the top, by the calling
   /// thread; rows that were not drawn have no hits.
   ///
-  /// Throws  Error: also a file that cannot be read; there are no hits() then
+  /// Throws  Error: also a file that cannot be read; there are no hits() then. Several surfaces for
+  ///         which the memory limit is too small
   FrameStats render(const FrameRequest &request) override;
   std::vector<HitRecord> cast_rays(std::span<const WorldRay> rays, float isovalue,
                                    Normals normals) override;
-  Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {}) override;
+  Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {},
+                std::uint32_t num_views = 1) override;
 
   ImageSize size() const override { return size_; }
   std::vector<HitRecord> hits() override;
+  bool has_field_values() const override { return !field_values_.empty(); }
+  std::optional<std::array<float, 2>> field_range() override;
+  /// [height * width] Values of the field, if the last frame had FrameRequest::field_values.
+  const std::vector<float> &field_values() const { return field_values_; }
   /// Counts of open ambient rays of the last frame's hits.
   const OpenCounts &open() const { return open_; }
+  /// [height * width] What rays have seen, if the last frame had FrameRequest::surfaces.
+  const std::vector<RayColor> &colors() const { return colors_; }
   FrameArrays fetch(const WantedArrays &wanted, const Appearance &appearance) override;
 
   void keep_picture() override;
@@ -62,7 +73,7 @@ class HostRenderer : public Renderer {
   void enlarge_kept(const FrameRequest &request) override;
 
   /// Forgets all decoded blocks, and keeps their memory for other blocks.
-  void clear_cache() override { levels_.forget(); }
+  void clear_cache() override;
   std::uint64_t num_decoded_blocks() const { return levels_.num_decoded(); }  ///< from the start
   /// Memory at present: value ranges and decoded blocks, without pictures.
   std::uint64_t memory_bytes() const override { return levels_.bytes(); }
@@ -71,23 +82,38 @@ class HostRenderer : public Renderer {
  private:
   void check_has_picture() const;
   void show_kept(bool everywhere);
-  void draw_bands(const FrameRequest &request, std::span<const HostLevel> drawing,
-                  FrameStats &stats);
+  template <class Draw>
+  void draw_picture(const FrameParams &frame, ImageSize size, std::vector<RayColor> colors,
+                    Draw draw);
+  void draw_one(const FrameRequest &request, std::span<const FrameParams> frames, ImageSize size,
+                FrameStats &stats);
+  void draw_surfaces(const FrameRequest &request, const FrameParams &frame, ImageSize size,
+                     FrameStats &stats);
+  std::uint64_t trace(std::span<const HostLevel> drawing, const RayTile &tile, bool is_alone,
+                      bool is_smooth);
+  template <class DrawTile>
+  void draw_bands(const FrameRequest &request, DrawTile draw_tile, FrameStats &stats);
+  void add_field_values(const FrameRequest &request, FrameStats &stats);
   void add_ambient(const FrameRequest &request, std::span<const HostLevel> drawing,
                    FrameStats &stats);
   template <class Draw, class After>
   bool for_bands(const OnPass &on_pass, bool more_follows, Draw draw, After after);
 
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();  ///< of making
+  const CompressedVolume &volume_;
   VolumeInfo info_;
   Abilities abilities_;
   std::uint32_t num_threads_;
+  std::uint64_t memory_limit_;  ///< 0: not given
   HostLevels levels_;
   double setup_ms_;
   FrameParams frame_{};  ///< of the finest level, for shading
   ImageSize size_;
   std::vector<HitRecord> hits_;
   OpenCounts open_;
+  std::vector<RayColor> colors_;          ///< of a frame of several or translucent surfaces
+  std::optional<HostFieldValues> field_;  ///< HostRendererOptions::field
+  std::vector<float> field_values_;
   std::vector<HitRecord> kept_;
   ImageSize kept_size_;
   HostMemory memory_;

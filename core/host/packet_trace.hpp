@@ -118,10 +118,10 @@ inline void make_packet_rays(const FrameParams &frame, Ints column, Ints row, Pa
   set_packet_interval(rays, frame.band);
 }
 
-/// Traces a packet's rays (column, row) of the frame in the given lanes, in their intervals.
-/// Returns the lanes that hit something. A function of its own, since it is long.
-__attribute__((flatten, noinline)) inline Mask trace_packet(const PacketScene &scene, Ints column,
-                                                            Ints row, Mask lanes, HitRecord *hits,
+/// Traces a packet's rays in the given lanes, in their intervals. ids: where their hits are
+/// written. Returns the lanes that hit something. A function of its own, since it is long.
+__attribute__((flatten, noinline)) inline Mask trace_packet(const PacketScene &scene, Ints ids,
+                                                            Mask lanes, HitRecord *hits,
                                                             Packet *p) {
   const Mask enters = enter_box(&p->rays, &scene) & lanes;
   if (!any(enters)) return enters;
@@ -129,9 +129,12 @@ __attribute__((flatten, noinline)) inline Mask trace_packet(const PacketScene &s
   begin_at_box(p, &scene, enters);
   walk_packet(p, &scene);
   if (!any(p->found.lanes)) return p->found.lanes;
-  write_hits(p, &scene, column + static_cast<int>(scene.frame->view.width) * row,
-             kDefaultSolver.max_steps, hits);
+  write_hits(p, &scene, ids, kDefaultSolver.max_steps, hits);
   return p->found.lanes;
+}
+
+inline Ints ray_ids(const FrameParams &frame, Ints column, Ints row) {
+  return column + static_cast<int>(frame.view.width) * row;
 }
 
 /// As trace_packets().
@@ -147,7 +150,7 @@ __attribute__((flatten)) inline uint trace_tile(const FrameParams &frame, const 
           (column < static_cast<int>(tile.end_x)) & (row < static_cast<int>(tile.end_y));
       Packet p;
       make_packet_rays(frame, column, row, &p.rays);
-      const Mask found = trace_packet(scene, column, row, within, hits, &p);
+      const Mask found = trace_packet(scene, ray_ids(frame, column, row), within, hits, &p);
       num_hits += static_cast<uint>(std::popcount(bits_of(found)));
     }
   }
@@ -182,11 +185,66 @@ __attribute__((flatten)) inline uint trace_band(const HostLevel &level, uint x, 
   if (any(begins_late))
     keep_sides(find_sides(&scene, &p.rays, p.rays.begin_t, begins_late), begins_late,
                sides->at_begin);
-  const Mask found = is_active ? trace_packet(scene, column, row, drawn, hits, &p) : ints(0);
+  const Mask found =
+      is_active ? trace_packet(scene, ray_ids(frame, column, row), drawn, hits, &p) : ints(0);
   const Mask left = drawn & ~found & (p.rays.end_t == frame.band.end_t);
   if (frame.band.end_t < ISO_NEVER && any(left))
     keep_sides(find_sides(&scene, &p.rays, p.rays.end_t, left), left, sides->at_end);
   return bits_of(found);
+}
+
+/// Puts lanes into cells of active blocks (at [3]: x, y, z) that need not be looked into.
+inline void begin_at_cells(Packet *p, const PacketScene *scene, const Ints *at, Mask lanes) {
+  PacketLevel *cells = &p->level[ISO_CELLS], *blocks = &p->level[ISO_BLOCKS],
+              *macrocells = &p->level[ISO_MACROCELLS];
+  cells->place = blocks->place = macrocells->place = ints(0);
+  ISO_EACH_OF_3(axis) {
+    ISO_EACH_OF_3(level) {
+      p->level[level].far[axis] =
+          far_planes(p, axis, ISO_REGION_SIZE(level), at[axis] >> (2 * level));
+    }
+    cells->place += (at[axis] & 3) << (2 * axis);
+    blocks->place += (at[axis] >> 2 & 3) << (2 * axis);
+    macrocells->place +=
+        (at[axis] >> 4) * (axis == 0 ? 1 : scene->columns * (axis == 1 ? 1 : scene->rows));
+  }
+  macrocell_bits(scene->field, macrocells->place, lanes, &blocks->low, &blocks->high);
+  Ints block[3];
+  blocks_at(p, block);
+  open_blocks(scene->field, scene->frame, block, lanes, &cells->low, &cells->high);
+  const Ints bit = ints(1) << (cells->place & 31);
+  cells->low &= pick(cells->place < 32, ~bit, ints(-1));
+  cells->high &= pick(cells->place < 32, ints(-1), ~bit);
+  p->rays.entered.axis = ints(0); /* lanes leave the cells before this is asked for */
+  p->rays.entered.plane = floats(0.0f);
+  p->at[ISO_CELLS] = lanes;
+}
+
+/// As trace_packet_behind().
+__attribute__((flatten)) inline void trace_behind(const HostLevel &surface, uint x, uint y,
+                                                  uint lanes, uint capped, const HitRecord *hits,
+                                                  HitRecord *next) {
+  const FrameParams &frame = surface.frame;
+  PacketScene scene;
+  if (!make_packet_scene(&frame, &surface.field, &scene)) return;
+  const Ints column = columns_from(x), row = rows_from(y), ids{0, 1, 2, 3, 4, 5, 6, 7};
+  Packet p;
+  make_packet_rays(frame, column, row, &p.rays);
+  if (surface.clip != nullptr) clip_packet(&frame, surface.clip, column, row, &p.rays);
+  if (capped != 0) trace_packet(scene, ids, lanes_of(capped), next, &p);
+  if (lanes == 0) return;
+  const Mask of = lanes_of(lanes);
+  Ints at[3] = {ints(0), ints(0), ints(0)};
+  ISO_EACH_LANE(lane, of) {
+    const BlockCoords b = block_coords(&frame, hits[lane].block_id);
+    at[0][lane] = static_cast<int>(4 * b.x + (hits[lane].cell & 3));
+    at[1][lane] = static_cast<int>(4 * b.y + (hits[lane].cell >> 2 & 3));
+    at[2][lane] = static_cast<int>(4 * b.z + (hits[lane].cell >> 4 & 3));
+  }
+  open_packet(&p, &scene);
+  begin_at_cells(&p, &scene, at, of);
+  walk_packet(&p, &scene);
+  if (any(p.found.lanes)) write_hits(&p, &scene, ids, kDefaultSolver.max_steps, next);
 }
 
 }  // namespace isowave::core::ISO_PACKET_NAMESPACE

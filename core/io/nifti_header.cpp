@@ -98,7 +98,8 @@ VoxelType nifti_voxel_type(const NiftiHeader &header) {
               code);
 }
 
-void read_nifti_dims(const NiftiHeader &header, VolumeInfo &info) {
+/// A fourth axis is time.
+void read_nifti_dims(const NiftiHeader &header, VolumeHeader &result) {
   constexpr std::size_t kDimsAt = 40;
   const int num_axes = header.get<std::int16_t>(kDimsAt);
   if (num_axes < 1 || num_axes > 7) header.fail("broken header: {} axes", num_axes);
@@ -107,7 +108,9 @@ void read_nifti_dims(const NiftiHeader &header, VolumeInfo &info) {
     const int count = header.get<std::int16_t>(kDimsAt + 2 * std::size_t(axis));
     if (count <= 0) header.fail("broken header: {} voxels along axis {}", count, axis);
     if (axis <= 3) {
-      info.dims[axis - 1] = std::uint32_t(count);
+      result.info.dims[axis - 1] = std::uint32_t(count);
+    } else if (axis == 4) {
+      result.voxels.num_steps = std::uint32_t(count);
     } else if (count != 1) {
       is_volume = false;
     }
@@ -297,7 +300,7 @@ VolumeHeader read_nifti_header(const std::shared_ptr<const InputFile> &file, boo
   if (!bytes.has_at(kMagicAt, std::string_view("n+1\0", 4))) bytes.fail("not a NIfTI-1 file");
 
   VolumeHeader header;
-  read_nifti_dims(bytes, header.info);
+  read_nifti_dims(bytes, header);
   VoxelLayout &voxels = header.voxels;
   voxels.file = file;
   voxels.encoding = is_gzipped ? VoxelEncoding::kGzip : VoxelEncoding::kRaw;

@@ -200,6 +200,8 @@ struct NrrdAxis {
   std::string kind = "???", unit;
   std::optional<glm::dvec3> direction;
 
+  /// Whether a last axis counts volumes, rather than values of a voxel.
+  bool can_be_steps() const { return is_domain() || kind == "list"; }
   /// Along which one may resample; else the values of a voxel.
   bool is_domain() const {
     return kind == "domain" || kind == "space" || kind == "time" || kind == "???" || kind == "none";
@@ -275,9 +277,10 @@ std::optional<glm::dvec3> read_nrrd_space(const HeaderFields &fields) {
   fields.fail("space", "not supported: need one of 3 dimensions");
 }
 
-/// The three axes of the volume. All others must have size 1.
+/// The three axes of the volume. All others must have size 1, but for the last: if it is a fourth
+/// one, it is that of steps.
 std::vector<NrrdAxis> volume_axes(const HeaderFields &fields, std::vector<NrrdAxis> axes,
-                                  const std::string &what) {
+                                  const std::string &what, std::uint32_t &num_steps) {
   const bool by_direction = fields.has("space directions");
   if (by_direction) {
     const auto directions = parse_vectors(fields, "space directions");
@@ -286,11 +289,15 @@ std::vector<NrrdAxis> volume_axes(const HeaderFields &fields, std::vector<NrrdAx
     for (std::size_t i = 0; i < axes.size(); ++i) axes[i].direction = directions[i];
   }
   std::vector<NrrdAxis> chosen;
-  for (const NrrdAxis &axis : axes) {
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    const NrrdAxis &axis = axes[i];
+    const bool is_last = i + 1 == axes.size();
     if (by_direction ? axis.direction.has_value() : axis.is_domain() && chosen.size() < 3) {
       if (!axis.is_domain())
         fields.fail("kinds", "an axis that has a space direction must be a domain or space");
       chosen.push_back(axis);
+    } else if (is_last && chosen.size() == 3 && axis.can_be_steps()) {
+      num_steps = std::uint32_t(axis.size);
     } else if (axis.size != 1) {
       if (!axis.is_domain()) throw Error("{}: {} components per voxel, need 1", what, axis.size);
       throw Error("{}: an image of {} axes, need a volume of 3", what, axes.size());
@@ -398,11 +405,11 @@ void set_nrrd_byte_order(const HeaderFields &fields, VoxelLayout &voxels) {
   }
 }
 
-void check_other_nrrd_fields(const HeaderFields &fields, const VolumeInfo &info) {
+void check_other_nrrd_fields(const HeaderFields &fields, std::uint64_t num_voxels) {
   for (const std::string_view name : {"min", "max", "old min", "old max"}) {
     if (fields.has(name)) fields.numbers(name, 1, HeaderFields::Nan::kUnknown);
   }
-  if (fields.has("number") && fields.integer("number") != std::int64_t(info.num_voxels())) {
+  if (fields.has("number") && fields.integer("number") != std::int64_t(num_voxels)) {
     fields.fail("number", "not the product of the sizes");
   }
   if (fields.has("block size")) fields.fail("block size", "blocks are not supported");
@@ -417,17 +424,19 @@ VolumeHeader read_nrrd_header(const std::shared_ptr<const InputFile> &file) {
   const bool has_end = read_nrrd_fields(lines, what, fields);
 
   VolumeHeader header;
-  const std::vector<NrrdAxis> axes = volume_axes(fields, read_nrrd_axes(fields), what);
+  std::uint32_t num_steps = 1;
+  const std::vector<NrrdAxis> axes = volume_axes(fields, read_nrrd_axes(fields), what, num_steps);
   for (int i = 0; i < 3; ++i) header.info.dims[i] = std::uint32_t(axes[std::size_t(i)].size);
   if (const std::optional<glm::dvec3> to_lps = read_nrrd_space(fields)) {
     set_geometry_in_space(fields, axes, *to_lps, what, header);
   } else {
     set_geometry_by_axes(fields, axes, what, header);
   }
-  check_other_nrrd_fields(fields, header.info);
+  check_other_nrrd_fields(fields, header.info.num_voxels() * num_steps);
 
   VoxelLayout &voxels = header.voxels;
   header.info.type = voxels.type = nrrd_voxel_type(fields);
+  voxels.num_steps = num_steps;
   voxels.encoding = nrrd_encoding(fields);
   set_nrrd_byte_order(fields, voxels);
   set_nrrd_skips(fields, voxels);

@@ -43,7 +43,14 @@ std::filesystem::path voxel_file(const fs::path &path) {
   return header ? header->voxels.file->path() : path;
 }
 
-std::unique_ptr<VolumeReader> open_volume(const fs::path &path, const RawOverrides &overrides) {
+std::optional<std::uint32_t> num_steps(const fs::path &path) {
+  const std::optional<VolumeHeader> header = read_header(std::make_shared<const InputFile>(path));
+  if (!header || header->voxels.num_steps == 1) return std::nullopt;
+  return header->voxels.num_steps;
+}
+
+std::unique_ptr<VolumeReader> open_volume(const fs::path &path, const RawOverrides &overrides,
+                                          std::optional<std::uint32_t> step) {
   const auto file = std::make_shared<const InputFile>(path);
   if (has_ending(path, {".raw", ".raw.gz"}))
     return open_raw(file, has_ending(path, {".gz"}), overrides);
@@ -59,6 +66,14 @@ std::unique_ptr<VolumeReader> open_volume(const fs::path &path, const RawOverrid
   }
   if (overrides.spacing) header->info.spacing = *overrides.spacing;
   check_volume_info(header->info, path.string());
+  VoxelLayout &voxels = header->voxels;
+  if (!step && voxels.num_steps > 1)
+    throw Error("{}: an image of 4 axes, need a volume of 3: it is a series of {} steps",
+                path.string(), voxels.num_steps);
+  voxels.step = step.value_or(0);
+  if (voxels.step >= voxels.num_steps)
+    throw Error("{}: step {} of a file that has {}: count from 0", path.string(), voxels.step,
+                voxels.num_steps);
   return open_voxels(*header);
 }
 

@@ -1,8 +1,10 @@
 #pragma once
 // Opens uncompressed volumes of every format that is read here.
 
+#include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 
 #include "core/io/raw_reader.hpp"
 #include "core/volume/volume.hpp"
@@ -14,9 +16,17 @@ namespace isowave::core {
 /// layers are read as they are asked for, in bounded memory.
 ///
 /// Throws  Error: unknown extension, missing file or none but a regular one, bad name, a header
-///         that is not understood, zero dims, truncated or oversized data, more than one component
+///         that is not understood, zero dims, truncated or oversized data, more than one component;
+///         there is no such step
+///
+/// step  of a file with a fourth axis; none: the file must have one volume
 std::unique_ptr<VolumeReader> open_volume(const std::filesystem::path &path,
-                                          const RawOverrides &overrides = {});
+                                          const RawOverrides &overrides = {},
+                                          std::optional<std::uint32_t> step = {});
+/// Number of volumes that the file has along its fourth axis; none if its header has no such axis.
+///
+/// Throws  Error: it has no header that is understood
+std::optional<std::uint32_t> num_steps(const std::filesystem::path &path);
 /// The file that has the voxels: the one that the volume's header names, or else the volume's own.
 ///
 /// Throws  Error as open_volume()

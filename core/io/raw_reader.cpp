@@ -31,10 +31,18 @@ std::uint64_t num_bytes(const VolumeInfo &info, const VoxelLayout &voxels) {
   return info.num_voxels() * size_of(voxels.type);
 }
 
+/// A number of each step, for all of them: at most 2^62, more than any file has.
+std::uint64_t of_all_steps(std::uint64_t number, const VoxelLayout &voxels) {
+  constexpr std::uint64_t kMost = std::uint64_t{1} << 62;
+  return number > kMost / voxels.num_steps ? kMost : number * voxels.num_steps;
+}
+
 [[noreturn]] void fail_size(const VolumeInfo &info, const VoxelLayout &voxels, std::string_view how,
                             std::string_view needed, std::string_view found) {
-  throw Error("{}: {}: {}x{}x{} {} voxels need {} bytes, found {}", voxels.file->what(), how,
-              info.dims.x, info.dims.y, info.dims.z, to_string(voxels.type), needed, found);
+  const std::string steps =
+      voxels.num_steps > 1 ? fmt::format("{} steps of ", voxels.num_steps) : std::string();
+  throw Error("{}: {}: {}{}x{}x{} {} voxels need {} bytes, found {}", voxels.file->what(), how,
+              steps, info.dims.x, info.dims.y, info.dims.z, to_string(voxels.type), needed, found);
 }
 
 /// The values of stored voxels, exact.
@@ -130,8 +138,9 @@ class RawReader : public VolumeReader {
     if (count < bytes.size()) fail_size("truncated");
   }
 
-  /// After the last layer nothing may follow. Also makes zlib check the stream's checksum.
+  /// After the file's last layer nothing may follow. Also makes zlib check the stream's checksum.
   void check_end() {
+    if (voxels_.step + 1 < voxels_.num_steps) return;
     std::vector<std::byte> rest(1u << 18);
     const std::size_t count = source_->read(rest);
     bytes_read_ += count;
@@ -139,8 +148,9 @@ class RawReader : public VolumeReader {
   }
 
   [[noreturn]] void fail_size(std::string_view how, std::string_view at_least = "") const {
-    isowave::core::fail_size(info_, voxels_, how, fmt::format("{}", num_bytes(info_, voxels_)),
-                             fmt::format("{}{}", at_least, bytes_read_));
+    isowave::core::fail_size(
+        info_, voxels_, how, fmt::format("{}", of_all_steps(num_bytes(info_, voxels_), voxels_)),
+        fmt::format("{}{}", at_least, num_bytes(info_, voxels_) * voxels_.step + bytes_read_));
   }
 
   VoxelLayout voxels_;
@@ -155,11 +165,12 @@ bool is_compressed(VoxelEncoding encoding) {
   return encoding == VoxelEncoding::kGzip || encoding == VoxelEncoding::kGzipOrZlib;
 }
 
-/// The place in the file at which voxels, or the compressed data that holds them, begin.
+/// The place in the file at which voxels of all steps, or the compressed data that holds them,
+/// begin.
 std::uint64_t find_begin(const VolumeHeader &header) {
   const VoxelLayout &voxels = header.voxels;
   const std::shared_ptr<const InputFile> &file = voxels.file;
-  const std::uint64_t bytes = num_bytes(header.info, voxels);
+  const std::uint64_t bytes = of_all_steps(num_bytes(header.info, voxels), voxels);
   std::uint64_t begin = std::min(voxels.offset, file->size());
   if (voxels.from_end) {
     if (file->size() - begin < bytes)
@@ -185,11 +196,11 @@ std::uint64_t find_begin(const VolumeHeader &header) {
 /// Refuses at once what cannot be right: `found` bytes of the file from where voxels begin.
 void check_size(const VolumeHeader &header, std::uint64_t found) {
   const VoxelLayout &voxels = header.voxels;
-  const std::uint64_t bytes = num_bytes(header.info, voxels);
+  const std::uint64_t bytes = of_all_steps(num_bytes(header.info, voxels), voxels);
   std::uint64_t least = bytes;
   if (voxels.encoding == VoxelEncoding::kHex) least = bytes * 2;
   if (voxels.encoding == VoxelEncoding::kText)
-    least = header.info.num_voxels() * 2 - 1;  // a digit each, and spaces
+    least = of_all_steps(header.info.num_voxels(), voxels) * 2 - 1;  // a digit each, and spaces
   if (is_compressed(voxels.encoding)) {
     least = bytes / kMaxDeflateRatio;
     if (voxels.packed_bytes && *voxels.packed_bytes != found) {
@@ -267,9 +278,16 @@ std::optional<RawName> parse_raw_name(std::string_view stem) {
 std::unique_ptr<VolumeReader> open_voxels(const VolumeHeader &header) {
   const VoxelLayout &voxels = header.voxels;
   const std::shared_ptr<const InputFile> &file = voxels.file;
-  const std::uint64_t begin = find_begin(header);
+  std::uint64_t begin = find_begin(header);
   check_size(header, file->size() - begin);
   VolumeHeader remaining = header;
+  if (!is_compressed(voxels.encoding)) remaining.voxels.bytes_to_skip = 0;
+  const std::uint64_t before = num_bytes(header.info, voxels) * voxels.step;
+  if (voxels.encoding == VoxelEncoding::kRaw) {
+    begin += before;
+  } else {
+    remaining.voxels.bytes_to_skip += before;
+  }
   std::unique_ptr<ByteSource> source;
   switch (voxels.encoding) {
     case VoxelEncoding::kRaw:
@@ -289,7 +307,6 @@ std::unique_ptr<VolumeReader> open_voxels(const VolumeHeader &header) {
       remaining.voxels.big_endian = false;
       break;
   }
-  if (!is_compressed(voxels.encoding)) remaining.voxels.bytes_to_skip = 0;
   return std::make_unique<RawReader>(remaining, std::move(source));
 }
 

@@ -23,7 +23,8 @@ namespace isowave::core {
 
 enum class VoxelEncoding { kRaw, kGzip, kGzipOrZlib, kHex, kText };
 
-/// Voxels fill their file from where they begin to its end.
+/// Voxels fill their file from where they begin to its end, the volumes of a series one after the
+/// other.
 struct VoxelLayout {
   std::shared_ptr<const InputFile> file;  ///< the header's own or the one it names
   VoxelEncoding encoding = VoxelEncoding::kRaw;
@@ -34,6 +35,8 @@ struct VoxelLayout {
       false;  ///< raw: the voxels are the last bytes of the file, whatever is before them
   std::optional<std::uint64_t> packed_bytes;  ///< compressed bytes, if the header states them
   VoxelType type = VoxelType::kFloat32;       ///< as stored
+  std::uint32_t num_steps = 1;  ///< volumes in the file: above 1 if it has a fourth axis
+  std::uint32_t step = 0;       ///< the one that is read
   bool big_endian = false;
   /// A voxel's value is slope * stored + intercept.
   double slope = 1.0, intercept = 0.0;

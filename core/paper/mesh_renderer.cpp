@@ -334,8 +334,9 @@ std::vector<HitRecord> MeshRenderer::cast_rays(std::span<const WorldRay>, float,
   throw Error("drawn triangles answer no rays of any origin: draw by a ray pipeline");
 }
 
-Camera MeshRenderer::camera(std::span<const float> isovalues, std::optional<ImageSize> size) {
-  return HostRenderer(volume_).camera(isovalues, size.value_or(options_.size));
+Camera MeshRenderer::camera(std::span<const float> isovalues, std::optional<ImageSize> size,
+                            std::uint32_t num_views) {
+  return HostRenderer(volume_).camera(isovalues, size.value_or(options_.size), num_views);
 }
 
 std::vector<HitRecord> MeshRenderer::hits() {
@@ -352,8 +353,8 @@ std::uint64_t MeshRenderer::num_hits(const FrameStats &) {
 
 FrameArrays MeshRenderer::fetch(const WantedArrays &wanted, const Appearance &appearance) {
   if (!has_picture_) throw Error("there is no picture: no frame has been drawn");
-  return shade_(wanted, make_shade_params(volume_.info, appearance),
-                make_hit_map({&volume_.info, 1}), blocks_.rays(), size_.samples);
+  return shade_(wanted, make_shading(volume_.info, appearance), make_hit_map({&volume_.info, 1}),
+                blocks_.rays(), nullptr, size_.samples);
 }
 
 }  // namespace isowave::core

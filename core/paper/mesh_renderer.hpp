@@ -71,7 +71,8 @@ class MeshRenderer : public Renderer {
   /// Throws  Error: triangles are drawn only from a camera
   std::vector<HitRecord> cast_rays(std::span<const WorldRay> rays, float isovalue,
                                    Normals normals) override;
-  Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {}) override;
+  Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {},
+                std::uint32_t num_views = 1) override;
 
   /// Statistics of the last frame; zeros if there was none.
   const MeshFrameStats &last_frame() const { return last_; }

@@ -120,25 +120,46 @@ void BlockStore::open(Wavefront &rays, std::vector<FrameParams> frames,
     FrameParams &frame = frames[i];
     frame.schedule = schedule_;
     frame.schedule.table_groups = cache.table_groups;
-    if (draws(frame)) {
-      const auto stage = device.timer().stage("macrocells");
-      level.macrocells.select(frame, level.range_error, &level.stream);
-      frame.surface = level.macrocells.surface(frame);
-      // A ray may begin outside the box: at a border between bands, or at a cap.
-      if (!has_bands && source == RaySource::kCamera && !rays.is_clipped())
-        frame.screen = make_screen_box(frame);
-    }
+    // A ray may begin outside the box: at a border between bands, or at a cap.
+    if (draws(frame))
+      select(level, frame, !has_bands && source == RaySource::kCamera && !rays.is_clipped());
     level.frame = frame;
   }
   level_frames->assign(first, end);
   rays.frame = level_frames->front();
   rays.num_level_frames = static_cast<std::uint32_t>(level_frames->size());
   if (levels.size() > 1) rays.level_frames.write_async(*level_frames);
+  classify(rays, isovalue);
+}
+
+/// Finds the active blocks of a level's frame.
+///
+/// has_box  all rays that may hit meet the box around them
+void BlockStore::select(Level &level, FrameParams &frame, bool has_box) {
+  const auto stage = device.timer().stage("macrocells");
+  level.macrocells.select(frame, level.range_error, &level.stream);
+  frame.surface = level.macrocells.surface(frame);
+  if (has_box) frame.screen = make_screen_box(frame);
+}
+
+void BlockStore::classify(Wavefront &rays, float isovalue) {
   if (cached_isovalue_.value_or(isovalue) != isovalue) {
     const auto stage = device.timer().stage("macrocells");
     cache.classify(rays);
   }
   cached_isovalue_ = isovalue;
+}
+
+void BlockStore::show_surface(Wavefront &rays, std::size_t selection, float isovalue) {
+  Level &level = levels[drawing.first];
+  level.macrocells.use(selection);
+  FrameParams frame = level.frame;
+  frame.surface.isovalue = isovalue;
+  select(level, frame, !rays.is_clipped());
+  level.frame = rays.frame = frame;
+  level_frames->assign(1, frame);
+  if (levels.size() > 1) rays.level_frames.write_async(*level_frames);
+  classify(rays, isovalue);
 }
 
 /// Has blocks decoded to these values, and forgets those of others.
@@ -180,6 +201,7 @@ void BlockStore::provide(const CountsBuffer &asked, LevelRange of, Wavefront &ra
     clear();
     rays.reset_counts();
     forget_requests();
+    if (on_reset) on_reset();
     throw;
   }
 }
@@ -237,6 +259,7 @@ void BlockStore::resize(const BlockCache::Limits &limits, Wavefront &rays) {
   slots_are_scarce_ = true;
   cached_isovalue_.reset();
   forget_requests();
+  if (on_reset) on_reset();
 }
 
 Uploads BlockStore::uploads() const {

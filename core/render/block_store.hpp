@@ -75,6 +75,12 @@ class BlockStore {
   void open(Wavefront &rays, std::vector<FrameParams> frames,
             const std::vector<DecodedValues> &values, FieldBound bound, RaySource source);
 
+  /// Goes on with another surface of the frame at work, which one level of detail draws.
+  ///
+  /// selection  its selection of active blocks (MacrocellBuffers), 0: that of open()
+  /// Waits      at the first call for an isovalue
+  void show_surface(Wavefront &rays, std::size_t selection, float isovalue);
+
   /// Begins a pass: gives slots and values to the blocks that the pass before requested.
   ///
   /// rays    after Wavefront::open_pass()
@@ -118,6 +124,8 @@ class BlockStore {
   void resize(const BlockCache::Limits &limits, Wavefront &rays);
   /// Called when the number of slots has changed. It may throw Error.
   std::function<void(std::uint32_t num_slots)> on_resize;
+  /// Called when the clock of the passes was set back: slots of another cache have later stamps.
+  std::function<void()> on_reset;
   /// Uploads since the store was made, if the volume stays on the host.
   Uploads uploads() const;
 
@@ -132,6 +140,8 @@ class BlockStore {
 
  private:
   void grow(Wavefront &rays);
+  void select(Level &level, FrameParams &frame, bool has_box);
+  void classify(Wavefront &rays, float isovalue);
   void decode_as(const std::vector<DecodedValues> &values);
 
   std::uint32_t wanted_slots_ = 0;        ///< slots from the next frame on

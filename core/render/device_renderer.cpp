@@ -10,6 +10,7 @@
 #include "core/base/error.hpp"
 #include "core/base/ms_since.hpp"
 #include "core/ocl/in_process.hpp"
+#include "core/render/picture_so_far.hpp"
 #include "core/render/stall_guard.hpp"
 #include "core/render/surface_camera.hpp"
 #include "core/view/detail.hpp"
@@ -22,8 +23,12 @@ namespace isowave::core {
 namespace {
 
 /// Slots that the frame has freed of blocks that it had requested itself.
-std::uint64_t recycled_blocks(const FrameStats &stats) {
-  std::uint64_t sum = stats.normals.recycled_blocks + stats.ambient.recycled_blocks;
+///
+/// has_slices  values of the field are the volume's own
+std::uint64_t recycled_blocks(const FrameStats &stats, bool has_slices = false) {
+  std::uint64_t sum = stats.normals.recycled_blocks + stats.behind.recycled_blocks +
+                      stats.ambient.recycled_blocks +
+                      (has_slices ? stats.field.recycled_blocks : 0);
   for (const PassStats &pass : stats.passes) sum += pass.counts.recycled_count;
   return sum;
 }
@@ -55,10 +60,36 @@ FrameStats DeviceRenderer::render(const FrameRequest &request) {
   const auto begin = std::chrono::steady_clock::now();
   const Uploads before = blocks_.uploads();
   const bool is_smooth = request.normals == Normals::kSmooth;
-  Frame frame{request.on_pass, request.ambient_rays + (is_smooth ? 1 : 0)};
+  const LightRays light_rays = light_rays_of(request);
+  Frame frame{request.on_pass,
+              light_rays.count() + (is_smooth ? 1 : 0) + (request.field_values ? 1 : 0)};
   begin_frame(request);
   frame.stats.first_level = blocks_.drawing.first;
   frame.stats.last_level = blocks_.drawing.end - 1;
+  if (request.surfaces.empty()) {
+    draw_surface(request, frame);
+  } else {
+    draw_layers(request, frame);
+  }
+  if (request.field_values) run(*field_, frame);
+  if (light_rays.count() != 0)
+    ambient_->begin(blocks_.levels[blocks_.drawing.first].info, blocks_.drawing.first, light_rays);
+  for (std::uint32_t round = 0; round < light_rays.count(); ++round) cast_round(round, frame);
+  FrameStats &stats = frame.stats;
+  if (light_rays.count() != 0 && !stats.cancelled) (*ambient_)(rays_, light_rays.count());
+  blocks_.close(recycled_blocks(stats, !request.slices.planes.empty()), stats.cancelled);
+  rays_.frame = blocks_.levels[0].frame;  // for shading
+  const Uploads after = blocks_.uploads();
+  stats.uploaded_blocks = after.blocks - before.blocks;
+  stats.uploaded_bytes = after.bytes - before.bytes;
+  stats.complete = !stats.cancelled;
+  stats.total_ms = ms_since(begin);
+  return std::move(stats);
+}
+
+/// Draws the hits of the request's one opaque surface.
+void DeviceRenderer::draw_surface(const FrameRequest &request, Frame &frame) {
+  const bool is_smooth = request.normals == Normals::kSmooth;
   const std::pair view(request.camera, request.isovalue);
   bool &took_one_pass = took_one_pass_[last_view_ == view];
   last_view_ = view;
@@ -68,20 +99,6 @@ FrameStats DeviceRenderer::render(const FrameRequest &request) {
   blocks_.counts_touched = false;
   took_one_pass = frame.stats.passes.size() == 1;
   if (is_smooth) run(normals_of_camera_, frame);
-  if (request.ambient_rays != 0)
-    ambient_->begin(blocks_.levels[blocks_.drawing.first].info, blocks_.drawing.first,
-                    request.ambient_rays);
-  for (std::uint32_t round = 0; round < request.ambient_rays; ++round) cast_round(round, frame);
-  FrameStats &stats = frame.stats;
-  if (request.ambient_rays != 0 && !stats.cancelled) (*ambient_)(rays_, request.ambient_rays);
-  blocks_.close(recycled_blocks(stats), stats.cancelled);
-  rays_.frame = blocks_.levels[0].frame;  // for shading
-  const Uploads after = blocks_.uploads();
-  stats.uploaded_blocks = after.blocks - before.blocks;
-  stats.uploaded_bytes = after.bytes - before.bytes;
-  stats.complete = !stats.cancelled;
-  stats.total_ms = ms_since(begin);
-  return std::move(stats);
 }
 
 /// Runs the passes of one wave until none of its rays is left, or on_pass says to stop. Does
@@ -94,14 +111,15 @@ void DeviceRenderer::run(Wave &wave, Frame &frame, Wave *next) {
   const auto begin = std::chrono::steady_clock::now();
   const bool in_step = this->in_step(frame.on_pass);
   LaterPasses *sum = wave.sum_in(frame.stats);
+  BlockStore &blocks = wave.own_blocks() != nullptr ? *wave.own_blocks() : blocks_;
   if (sum != nullptr) --frame.waves_left;
-  StallGuard guard(blocks_.levels[0].info.dims);
+  StallGuard guard(blocks.levels[0].info.dims);
   passes_.begin(wave);
   if (&wave == camera_rays_.get()) has_picture_ = true;  // the hits of the frame before are gone
   if (next != nullptr && !in_step) passes_.begin_early(*next);
   for (bool finished = false; !finished && !frame.stats.cancelled;) {
     while (passes_.are_read() || (!in_step && passes_.have_room())) passes_.enqueue(wave);
-    PassStats pass = stats_of(passes_.pop());
+    PassStats pass = stats_of(passes_.pop(), blocks);
     finished = pass.counts.next_active_count == 0;
     if (sum != nullptr) {
       *sum += later_pass(pass);
@@ -115,7 +133,7 @@ void DeviceRenderer::run(Wave &wave, Frame &frame, Wave *next) {
     frame.stats.cancelled = frame.on_pass && !frame.on_pass(pass) && more_follows;
     guard.check(pass.counts);
     if (!finished) passes_.take_back_early();
-    if (finished && !passes_.has_early()) blocks_.forget_requests();
+    if (finished && !passes_.has_early()) blocks.forget_requests();
   }
   if (sum != nullptr) sum->ms += ms_since(begin);
 }
@@ -148,10 +166,21 @@ DeviceRenderer::DeviceRenderer(ocl::Device &device, const CompressedVolume &volu
       passes_(device, rays_) {
   const MemoryPlan &plan = blocks_.plan;
   if (plan.limits.kept_rays != 0) kept_.emplace(device, plan.limits.kept_rays);
+  if (options_.max_surfaces != 0) {
+    layers_.emplace(device, plan.limits.layers, options_.group_size);
+    behind_.emplace(blocks_, rays_, *layers_, options_.group_size, options_.solver);
+    layer_normals_.emplace(blocks_, rays_, smooth_normals_, *layers_);
+    slice_values_.emplace(blocks_, rays_, *layers_, options_.group_size);
+  }
   if (options_.with_given_rays) {
     given_rays_.emplace(blocks_, rays_, options_.group_size, options_.solver, RaySource::kGiven);
     ambient_.emplace(device, rays_.num_rays, blocks_.levels.size() > 1, is_brick());
     ambient_round_.emplace(blocks_, rays_, *ambient_, *given_rays_);
+  }
+  if (options_.field != nullptr) {
+    field_.emplace(device, *options_.field, levels(), plan.field, options_.group_size, rays_);
+    blocks_.on_reset = [this] { field_->clear(); };
+    field_->own_blocks()->on_reset = [this] { blocks_.clear(); };
   }
   options_.cache_slots = plan.cache_slots;
   options_.stream = plan.stream;
@@ -182,11 +211,18 @@ void DeviceRenderer::compile_kernels() {
     for (Level &level : blocks_.levels) level.frame = rays.frame;
     std::vector<Wave *> waves{camera_rays_.get()};
     if (options_.with_shading) waves.push_back(&normals_of_camera_);
+    if (behind_ && num_levels == 1) {
+      layers_->compile(rays);
+      waves.push_back(&*behind_);
+    }
+    if (field_) waves.push_back(&*field_);
     if (ambient_round_) waves.push_back(&*ambient_round_);
     for (Wave *wave : waves) {
       wave->begin();
       for (int pass = 0; pass < 2; ++pass) wave->enqueue_pass();  // the first decodes nothing
       blocks_.forget_requests();
+      if (field_) field_->own_blocks()->forget_requests();
+      if (behind_ && wave == &*behind_) layers_->swap_hits(rays, 0);
     }
   }
   blocks_.cache.classify(rays);
@@ -205,7 +241,9 @@ Abilities DeviceRenderer::abilities_of(const RendererOptions &options) {
   abilities.levels = options.with_levels;
   abilities.fewer_planes = true;
   abilities.clipping = options.pipeline->has_clipping();
+  abilities.field = options.field != nullptr;
   abilities.bounds = options.with_bounds;
+  abilities.most_surfaces = options.max_surfaces;
   abilities.given_rays = options.with_given_rays;
   abilities.kept_picture = options.with_kept_picture;
   abilities.solver = options.solver;
@@ -226,18 +264,26 @@ std::vector<VolumeInfo> DeviceRenderer::levels() const {
 
 void DeviceRenderer::begin_frame(const FrameRequest &request) {
   core::check(request, abilities());
-  if (request.ambient_rays != 0 && is_brick())
-    throw Error("a brick's ambient rays go on in other bricks: see TeamRenderer");
+  if (light_rays_of(request).count() != 0 && is_brick())
+    throw Error("a brick's ambient and shadow rays go on in other bricks: see TeamRenderer");
   const ImageSize size = size_of(request, abilities());
+  const SurfaceStyle first = request.surfaces.empty()
+                                 ? SurfaceStyle{.isovalue = request.isovalue}
+                                 : request.surfaces[innermost_first(request.surfaces)[0]];
   std::vector<FrameParams> frames = make_level_frames(infos_of(blocks_.levels), request.camera,
-                                                      size, request.isovalue, request.voxel_pixels);
+                                                      size, first.isovalue, request.voxel_pixels);
   const std::vector<DecodedValues> values = decoded_values(request);
   has_picture_ = false;
+  has_layers_ = is_in_further_layer_ = false;
+  finds_first_of_.reset();
+  finds_behind_of_.reset();
   size_ = size;
-  rays_.num_ambient = 0;
-  rays_.set_clip(
-      make_clip_params(blocks_.levels[0].info, frames.front().view, request.camera, request.clip));
+  rays_.num_ambient = rays_.num_shadow = 0;
+  rays_.set_clip(make_clip_params(blocks_.levels[0].info, frames.front().view, request.camera,
+                                  first.clipped ? request.clip : Clip{}));
   open_frame(std::move(frames), values, request.bound, RaySource::kCamera);
+  has_field_values_ = request.field_values;
+  if (field_) field_->begin_frame(has_field_values_, request.field_on_caps);
 }
 
 void DeviceRenderer::open_frame(std::vector<FrameParams> frames,
@@ -248,13 +294,13 @@ void DeviceRenderer::open_frame(std::vector<FrameParams> frames,
   options_.cache_slots = blocks_.plan.cache_slots;
 }
 
-PassStats DeviceRenderer::stats_of(const PassCounts &counts) {
+PassStats DeviceRenderer::stats_of(const PassCounts &counts, BlockStore &blocks) {
   const double rays = static_cast<double>(size_.num_rays());
   PassStats stats;
   stats.counts = counts;
   stats.counts.window_count = rays_in_window(counts.window_count, counts.active_count);
   camera_rays_->describe(stats);
-  blocks_.note(counts);
+  blocks.note(counts);
   stats.completed_percent = 100.0 * (rays - counts.next_active_count) / rays;
   stats.utilization_percent = 100.0 * counts.granted_count / rays;
   stats.stage_ms = device_.timer().collect();
@@ -288,9 +334,10 @@ std::optional<BlockBox> DeviceRenderer::surface_box(std::span<const float> isova
   return isowave::core::surface_box(finest.macrocells, finest.info, isovalues);
 }
 
-Camera DeviceRenderer::camera(std::span<const float> isovalues, std::optional<ImageSize> size) {
+Camera DeviceRenderer::camera(std::span<const float> isovalues, std::optional<ImageSize> size,
+                              std::uint32_t num_views) {
   return surface_camera(blocks_.levels[0].info, surface_box(isovalues),
-                        size.value_or(options_.size));
+                        size.value_or(options_.size), num_views);
 }
 
 std::vector<HitRecord> DeviceRenderer::cast_rays(std::span<const WorldRay> world_rays,
@@ -356,6 +403,7 @@ void DeviceRenderer::check_has_picture() const {
 
 std::vector<HitRecord> DeviceRenderer::hits() {
   check_has_picture();
+  const PictureSoFar shown(*this);
   std::vector<HitRecord> hits(size_.num_rays());
   rays_.hits.read(hits);
   return hits;
@@ -366,23 +414,40 @@ void DeviceRenderer::set_hits(std::span<const HitRecord> hits) {
   rays_.hits.write(hits);
 }
 
+std::optional<std::array<float, 2>> DeviceRenderer::field_range() {
+  check_has_picture();
+  if (!has_field_values_) return {};
+  return field_->range(size_.num_rays());
+}
+
+std::vector<float> DeviceRenderer::field_values() {
+  check_has_picture();
+  if (!has_field_values_) throw Error("the last frame has no values of a field");
+  std::vector<float> values(size_.num_rays());
+  rays_.field_values.read(values);
+  return values;
+}
+
 FrameArrays DeviceRenderer::fetch(const WantedArrays &wanted, const Appearance &appearance) {
   check_has_picture();
   check_arrays(wanted, size_);
-  return shade_(wanted, make_shade_params(blocks_.levels[0].info, appearance), hit_map_, rays_,
+  const PictureSoFar shown(*this);
+  return shade_(wanted, shading_of(blocks_.levels[0].info, appearance), hit_map_, rays_, colors(),
                 size_.samples);
 }
 
 HostArray<std::uint32_t> DeviceRenderer::shade_packed(const Appearance &appearance) {
   check_has_picture();
-  return shade_.packed(make_shade_params(blocks_.levels[0].info, appearance), rays_, size_.samples);
+  const PictureSoFar shown(*this);
+  return shade_.packed(shading_of(blocks_.levels[0].info, appearance), rays_, colors(),
+                       size_.samples);
 }
 
 OpenCounts DeviceRenderer::open() const {
   check_has_picture();
-  OpenCounts open{{}, rays_.num_ambient};
-  if (open.num_ambient == 0) return open;
-  open.counts.resize(size_.num_rays());
+  OpenCounts open{{}, rays_.num_ambient, rays_.num_shadow};
+  if (open.num_ambient == 0 && open.num_shadow == 0) return open;
+  open.counts.resize((open.num_shadow != 0 ? 2 : 1) * size_.num_rays());
   rays_.open_counts.read(open.counts);
   return open;
 }
@@ -425,10 +490,10 @@ void DeviceRenderer::begin_ambient(const FrameRequest &request, std::vector<HitR
 }
 
 std::vector<std::uint64_t> DeviceRenderer::blocked_rays(std::uint32_t round,
-                                                        std::uint32_t num_rounds,
+                                                        const LightRays &light_rays,
                                                         LaterPasses &stats) {
   rays_.frame = blocks_.level_frames->front();
-  ambient_->begin(blocks_.levels[blocks_.drawing.first].info, blocks_.drawing.first, num_rounds);
+  ambient_->begin(blocks_.levels[blocks_.drawing.first].info, blocks_.drawing.first, light_rays);
   const OnPass never_stops;
   Frame frame{never_stops, 1};
   cast_round(round, frame);
@@ -436,17 +501,19 @@ std::vector<std::uint64_t> DeviceRenderer::blocked_rays(std::uint32_t round,
   rays_.frame = blocks_.levels[0].frame;  // for shading
   std::vector<HitRecord> met(size_.num_rays());
   rays_.given_hits.read(met);
-  std::vector<GivenRay> given(rays_.is_clipped() ? met.size() : 0);
+  const bool is_shadow = round >= light_rays.num_ambient;
+  std::vector<GivenRay> given(rays_.is_clipped() || is_shadow ? met.size() : 0);
   if (!given.empty()) rays_.given.read(given);
   std::vector<std::uint64_t> blocked((met.size() + 63) / 64);
   for (std::size_t ray = 0; ray < met.size(); ++ray) {
     bool meets = met[ray].t != std::numeric_limits<float>::infinity();
-    if (meets && !given.empty()) {
+    if (meets && rays_.is_clipped()) {
       const float in_first = std::ldexp(1.0f, static_cast<int>(given[ray].level)),
                   voxel = std::ldexp(in_first, static_cast<int>(blocks_.drawing.first));
       const float t_scale = blocks_.level_frames->front().view.t_scale * in_first;
       meets = !is_clipped(&rays_.clip_params(), given[ray], voxel, met[ray].t / t_scale);
     }
+    if (is_shadow) meets |= !is_given(given[ray]);
     blocked[ray / 64] |= std::uint64_t{meets} << ray % 64;
   }
   blocks_.close(passes.recycled_blocks, true);
@@ -459,6 +526,7 @@ void DeviceRenderer::set_open(const OpenCounts &open) {
   check_has_given();
   rays_.open_counts.write(open.counts);
   rays_.num_ambient = open.num_ambient;
+  rays_.num_shadow = open.num_shadow;
 }
 
 KeptPicture &DeviceRenderer::kept() {
@@ -482,13 +550,14 @@ void DeviceRenderer::enlarge_kept(const FrameRequest &request) {
   const ImageSize size = size_of(request, abilities());
   rays_.frame = make_frame_params(blocks_.levels[0].info, request.camera, size, request.isovalue);
   size_ = size;
-  rays_.num_ambient = 0;
+  rays_.num_ambient = rays_.num_shadow = 0;
   kept().show(rays_, true);
   device_.finish();
 }
 
 void DeviceRenderer::clear_cache() {
   blocks_.clear();
+  if (field_) field_->clear();
   device_.finish();
 }
 

@@ -14,12 +14,14 @@
 
 #include "core/frame/renderer.hpp"
 #include "core/render/block_store.hpp"
+#include "core/render/field_wave.hpp"
 #include "core/render/memory_plan.hpp"
 #include "core/render/passes.hpp"
 #include "core/render/ray_waves.hpp"
 #include "core/render/renderer_options.hpp"
 #include "core/stages/ambient.hpp"
 #include "core/stages/kept_picture.hpp"
+#include "core/stages/layers.hpp"
 #include "core/stages/shade.hpp"
 #include "core/stages/smooth_normals.hpp"
 #include "core/zfp/zfp_stream.hpp"
@@ -60,17 +62,25 @@ class DeviceRenderer : public Renderer {
   /// Waits   yes
   std::optional<BlockBox> surface_box(std::span<const float> isovalues);
 
-  Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {}) override;
+  Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {},
+                std::uint32_t num_views = 1) override;
   std::vector<HitRecord> cast_rays(std::span<const WorldRay> rays, float isovalue,
                                    Normals normals) override;
 
   std::vector<HitRecord> hits() override;
+  bool has_field_values() const override { return has_field_values_; }
+  std::optional<std::array<float, 2>> field_range() override;
   /// Replaces the last frame's hits, which fetch() shows.
   ///
   /// hits    [size.ray_rows()][size.ray_columns()]
   /// Throws  Error: no frame was drawn
   /// Waits   yes
   void set_hits(std::span<const HitRecord> hits);
+  /// [height * width] Values of the field at the hits of the last frame, NaN where there is none.
+  ///
+  /// Throws  Error: no frame was drawn with FrameRequest::field_values
+  /// Waits   yes
+  std::vector<float> field_values();
   FrameArrays fetch(const WantedArrays &wanted, const Appearance &appearance) override;
   /// The picture of the hit buffer, RGBA in words, red in bits 0..7; A is 0 if no ray of a pixel
   /// hits.
@@ -84,6 +94,13 @@ class DeviceRenderer : public Renderer {
   // For bricks, whose pictures are put together (core/bricks). A brick's own frames have no ambient
   // rays, since these go on in other bricks.
 
+  /// render() of a frame of layers, without on_pass.
+  ///
+  /// layers  gets each layer's hits, and those behind the last layer that is drawn
+  FrameStats render_layers(const FrameRequest &request, std::vector<std::vector<RayHit>> &layers);
+  /// Sets the colours of a frame of layers, [height * width], that pictures have instead of its
+  /// own. Waits.
+  void set_colors(std::span<const RayColor> colors);
   /// hits() as all bricks can read them, of any level of detail: see placed_hit().
   std::vector<HitRecord> placed_hits();
   /// Begins the rounds of ambient rays of the last frame, which was not cancelled. Rays start at
@@ -94,12 +111,13 @@ class DeviceRenderer : public Renderer {
   ///          rays
   /// Waits    yes
   void begin_ambient(const FrameRequest &request, std::vector<HitRecord> placed, LevelRange levels);
-  /// Casts a round of ambient rays through this brick.
+  /// Casts a round of ambient or shadow rays through this brick.
   ///
-  /// round    0..num_rounds - 1
-  /// Returns  bits [(rays + 63) / 64]: 1 if the ray meets a surface in this brick
+  /// round    0..light_rays.count() - 1
+  /// Returns  bits [(rays + 63) / 64]: 1 if the ray meets a surface in this brick, or is a shadow
+  ///          ray of a hit that faces away from the light
   /// Waits    yes
-  std::vector<std::uint64_t> blocked_rays(std::uint32_t round, std::uint32_t num_rounds,
+  std::vector<std::uint64_t> blocked_rays(std::uint32_t round, const LightRays &light_rays,
                                           LaterPasses &stats);
   /// Sets the counts that pictures have instead of open(). Waits.
   void set_open(const OpenCounts &open);
@@ -128,6 +146,9 @@ class DeviceRenderer : public Renderer {
     FrameStats stats{};
   };
 
+  /// Makes rays_.hits the picture so far, while waves of layers have other hits there.
+  class PictureSoFar;
+
   void run(Wave &wave, Frame &frame, Wave *next = nullptr);
   void compile_kernels();
   void check_has_picture() const;
@@ -140,8 +161,20 @@ class DeviceRenderer : public Renderer {
   std::vector<FrameParams> frames_of_rays(std::uint32_t columns, std::uint32_t rows,
                                           float isovalue) const;
   std::vector<DecodedValues> decoded_values(const FrameRequest &request) const;
-  PassStats stats_of(const PassCounts &counts);
+  PassStats stats_of(const PassCounts &counts, BlockStore &blocks);
   void cast_round(std::uint32_t round, Frame &frame);
+  void draw_surface(const FrameRequest &request, Frame &frame);
+  void draw_layers(const FrameRequest &request, Frame &frame);
+  void show_surface(const FrameRequest &request, const ClipParams &clip, std::size_t place,
+                    float isovalue);
+  std::size_t find_first_hits(const FrameRequest &request, const ClipParams &clip,
+                              std::span<const float> isovalues, Frame &frame);
+  LayerCounts draw_layer(std::uint32_t layer, std::size_t num_surfaces, const FrameRequest &request,
+                         Frame &frame);
+  void find_hits_behind(const FrameRequest &request, const ClipParams &clip,
+                        std::span<const float> isovalues, const LayerCounts &counts,
+                        bool is_first_layer, Frame &frame);
+  const ocl::Buffer<RayColor> *colors() const { return has_layers_ ? &layers_->colors : nullptr; }
   bool in_step(const OnPass &on_pass) const {
     return on_pass || device_.timer().source() != ocl::TimerSource::kOff;
   }
@@ -160,15 +193,27 @@ class DeviceRenderer : public Renderer {
   /// Whether a single pass was enough: for the last frame that showed a new view [0], and for the
   /// last that showed the same view again [1].
   std::array<bool, 2> took_one_pass_{};
+  bool has_field_values_ = false;  ///< the frame at work, or the last one
   std::unique_ptr<Wave> camera_rays_;
   SmoothNormals smooth_normals_;
   SmoothNormalsWave normals_of_camera_, normals_of_given_;
   Shade shade_;
   HitMap hit_map_;
   std::optional<KeptPicture> kept_;
-  std::optional<RaysWave> given_rays_;  ///< this and the next two: options_.with_given_rays
+  std::optional<Layers> layers_;  ///< this and the next three: options_.max_surfaces
+  std::optional<BehindWave> behind_;
+  std::optional<LayerNormalsWave> layer_normals_;
+  std::optional<SliceValuesWave> slice_values_;
+  ScreenBox layers_screen_{};  ///< rays that may hit any surface of the frame
+  std::vector<std::vector<RayHit>> *layer_hits_ = nullptr;  ///< of render_layers()
+  bool has_layers_ = false;                                 ///< the frame at work, or the last one
+  std::optional<std::size_t> finds_first_of_;   ///< the surface whose first hits are in rays_.hits
+  std::optional<std::size_t> finds_behind_of_;  ///< the surface whose next hits are there
+  bool is_in_further_layer_ = false;            ///< whether the hits of a further layer are there
+  std::optional<RaysWave> given_rays_;          ///< this and the next two: options_.with_given_rays
   std::optional<Ambient> ambient_;
   std::optional<AmbientRound> ambient_round_;
+  std::optional<FieldWave> field_;  ///< options_.field
   Passes passes_;
   double setup_ms_ = 0;
 };

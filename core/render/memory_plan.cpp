@@ -9,6 +9,7 @@
 #include "core/base/error.hpp"
 #include "core/render/pass_readback.hpp"
 #include "core/stages/ambient.hpp"
+#include "core/stages/field_values.hpp"
 #include "core/stages/kept_picture.hpp"
 #include "core/stages/shade.hpp"
 #include "core/stages/zfp_decode.hpp"
@@ -87,17 +88,20 @@ RendererLimits limits_of(const CompressedVolume &volume, const MemoryRequest &re
   RendererLimits limits{
       .macrocells = {.num_blocks = last.place.ranges_begin + block_count(last.grid),
                      .num_macrocells = last.place.masks_begin / 2 + num_macrocells(last.grid),
-                     .num_selections = request.with_bounds ? kNumFieldBounds : 1,
+                     .num_selections = std::max<std::size_t>(
+                         request.with_bounds ? kNumFieldBounds : 1, request.max_surfaces),
                      .no_data_words = joined_no_data_words(levels_of(volume, request.with_levels))},
       .rays = {.num_rays = rays,
                .with_pairs = false,
                .num_levels = grids.size(),
-               .with_given = request.with_given_rays},
+               .with_given = request.with_given_rays,
+               .with_field = request.with_field || request.max_surfaces != 0},
       .cache = BlockCache::limits_for(
           make_id_grid(grids), cache_slots, rays, request.sparse_table ? 4 : 2,
           slot_type_for(levels_of(volume, request.with_levels), request.with_bounds)),
       .wave = {.num_rays = rays, .num_slots = cache_slots, .group_size = request.group_size},
-      .kept_rays = request.kept_rays};
+      .kept_rays = request.kept_rays,
+      .layers = {.num_rays = rays, .max_surfaces = request.max_surfaces}};
   request.pipeline->add_to(limits.rays);
   return limits;
 }
@@ -130,12 +134,12 @@ StreamPlace stream_place_from_string(std::string_view name) {
 }
 
 std::uint32_t first_cache_slots(std::uint64_t num_blocks, std::uint64_t num_rays,
-                                bool with_given_rays) {
+                                bool with_further_rays) {
   const double edge = std::cbrt(double(num_blocks));
   const std::uint64_t wanted =
       std::min(static_cast<std::uint64_t>(std::llround(kSlotsPerFace * edge * edge)),
                num_rays * kSlotsOfThose / kRaysPerSlot) *
-      (with_given_rays ? 2 : 1);
+      (with_further_rays ? 2 : 1);
   const std::uint64_t slots = std::min(std::max(wanted, kFewSlots), num_blocks);
   return static_cast<std::uint32_t>(
       std::clamp<std::uint64_t>(slots, kMinCacheSlots, ISO_MAX_CACHE_SLOTS));
@@ -154,6 +158,46 @@ MemoryPlan resized(MemoryPlan plan, std::uint32_t cache_slots) {
   plan.buffers.resize(BlockCache::sizes(plan.limits.cache));
   plan.buffers.resize(plan.pipeline->sizes(plan.limits.wave));
   plan.buffers.resize(ZfpDecode::sizes(plan.limits.cache.max_requests(), true, true));
+  return plan;
+}
+
+FieldPlan plan_field(const CompressedVolume &field, const MemoryRequest &request,
+                     std::uint64_t budget, std::uint32_t cache_slots) {
+  const BlockGrid grid = make_grid(field.info);
+  const auto plan_of = [&](std::uint32_t slots, StreamPlace place) {
+    FieldPlan plan;
+    plan.cache = BlockCache::limits_for(grid, slots, request.num_rays, 2, slot_type_for(field));
+    plan.stream = place;
+    plan.largest_stream_part = request.largest_stream_part;
+    MemoryPlan stream;
+    stream.stream = place;
+    if (place == StreamPlace::kHost)
+      plan.window_blocks = stream.window_blocks = window_blocks_for(field, request, slots);
+    const MacrocellBuffers::Limits macrocells{.num_blocks = block_count(grid),
+                                              .num_macrocells = num_macrocells(grid)};
+    MemoryRequest of_field = request;
+    of_field.with_bounds = false;
+    plan.bytes = stream_sizes(stream, field, of_field).bytes() +
+                 MacrocellBuffers::sizes(macrocells).bytes() +
+                 Macrocells::sizes(macrocells.num_macrocells, 1).bytes() +
+                 Macrocells::setup_scratch_bytes(field.num_blocks()) +
+                 BlockCache::sizes(plan.cache).bytes() + FieldValues::sizes().bytes();
+    return plan;
+  };
+  const bool may_be_on_device =
+      request.stream == StreamPlace::kDevice ||
+      (request.stream == StreamPlace::kAuto && fits_parts(field, request));
+  StreamPlace place = may_be_on_device ? StreamPlace::kDevice : StreamPlace::kHost;
+  if (request.stream == StreamPlace::kAuto && may_be_on_device &&
+      plan_of(kMinCacheSlots, place).bytes > budget / 4)
+    place = StreamPlace::kHost;
+  std::uint32_t slots =
+      cache_slots != 0 ? cache_slots : first_cache_slots(field.block_count(), request.num_rays);
+  FieldPlan plan = plan_of(slots, place);
+  while (cache_slots == 0 && plan.bytes > budget / 2 && slots > kMinCacheSlots) {
+    slots = std::max(slots / 2, kMinCacheSlots);
+    plan = plan_of(slots, place);
+  }
   return plan;
 }
 
@@ -179,6 +223,8 @@ MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &requ
       .add(Shade::sizes(request.num_rays))
       .add(PassReadback::sizes());
   if (request.with_given_rays) plan.buffers.add(Ambient::sizes());
+  if (limits.layers.max_surfaces != 0)
+    plan.buffers.add(Layers::sizes(limits.layers)).add(FieldValues::sizes());
   if (limits.kept_rays != 0) plan.buffers.add(KeptPicture::sizes(limits.kept_rays));
   return plan;
 }
@@ -271,7 +317,8 @@ MemoryPlan plan_to_grow(const ocl::Device &device, const CompressedVolume &volum
     num_blocks += level->block_count();
   const std::uint64_t first =
       first_slots != 0 ? first_slots
-                       : first_cache_slots(num_blocks, request.num_rays, request.with_given_rays);
+                       : first_cache_slots(num_blocks, request.num_rays,
+                                           request.with_given_rays || request.max_surfaces != 0);
   MemoryPlan plan = plan_of(first);
   const std::uint64_t decoded = slot_bytes(plan.limits.cache.slot_type) * volume.block_count();
   if (first_slots == 0 && plan.total() > decoded) {  // bytes grow linearly with the slots

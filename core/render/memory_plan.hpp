@@ -11,6 +11,7 @@
 #include "core/ocl/device.hpp"
 #include "core/render/pipeline.hpp"
 #include "core/stages/block_cache.hpp"
+#include "core/stages/layers.hpp"
 #include "core/stages/macrocells.hpp"
 #include "core/stages/wavefront.hpp"
 #include "core/zfp/zfp_stream.hpp"
@@ -40,7 +41,9 @@ struct MemoryRequest {
   bool with_bounds = false;         ///< the bounds of blocks' errors are on the device, too
   std::uint64_t kept_rays = 0;      ///< rays of KeptPicture
   bool with_given_rays = false;     ///< rays of any origin, and ambient rays
+  std::uint32_t max_surfaces = 0;   ///< of frames with layers
   bool sparse_table = false;        ///< the cache's table has room, so that rays look up faster
+  bool with_field = false;          ///< hits have values of a field
 };
 
 /// Limits that the lengths of a renderer's buffers depend on, beside its compressed volume. The
@@ -51,6 +54,16 @@ struct RendererLimits {
   BlockCache::Limits cache{};
   WaveLimits wave{};            ///< camera rays
   std::uint64_t kept_rays = 0;  ///< rays of KeptPicture; 0: there is none
+  Layers::Limits layers{};
+};
+
+/// The memory of a field beside the volume (core/render/field_wave.hpp).
+struct FieldPlan {
+  BlockCache::Limits cache{};
+  StreamPlace stream = StreamPlace::kDevice;  ///< kDevice or kHost
+  std::uint32_t window_blocks = 0;            ///< kHost: see StreamWindow
+  std::uint64_t largest_stream_part = 0;      ///< as MemoryRequest
+  std::uint64_t bytes = 0;                    ///< all its buffers, scratch of its making included
 };
 
 struct MemoryPlan {
@@ -65,9 +78,10 @@ struct MemoryPlan {
   StreamPlace stream = StreamPlace::kDevice;  ///< kDevice or kHost
   std::uint32_t window_blocks = 0;            ///< kHost: see StreamWindow
   std::uint64_t stream_bytes = 0;             ///< bytes of the compressed volume's buffers
+  FieldPlan field{};                          ///< of 0 bytes: there is none
   std::string reason;  ///< reason for the place: "the compressed volume of 10 bytes ..."
 
-  std::uint64_t total() const { return buffers.bytes(); }
+  std::uint64_t total() const { return buffers.bytes() + field.bytes; }
   /// The most bytes that exist while the cache has this size. A cache is freed before a larger one
   /// is made, so after the cache has grown this is also the most that ever existed.
   std::uint64_t peak() const { return std::max(total(), setup_bytes); }
@@ -78,15 +92,23 @@ struct MemoryPlan {
 MemoryPlan resized(MemoryPlan plan, std::uint32_t cache_slots);
 
 /// Initial number of slots of a cache that may grow: twice the blocks that a frame needs in most
-/// volumes, so that the next frame finds free slots. Twice that with rays of any origin: ambient
-/// rays come to blocks that the camera's rays do not, and a cache that grows for them makes the
-/// second frame a cold one.
+/// volumes, so that the next frame finds free slots. Twice that with rays that come to more blocks
+/// than the camera's to their first hits: ambient rays, and those behind translucent surfaces. A
+/// cache that grows for them makes the second frame a cold one.
 std::uint32_t first_cache_slots(std::uint64_t num_blocks, std::uint64_t num_rays,
-                                bool with_given_rays = false);
+                                bool with_further_rays = false);
 
 /// Slots for the next frame, after one that has freed `recycled` slots of blocks that it had
 /// requested itself; plan.cache_slots if these are enough.
 std::uint32_t grown_cache_slots(const MemoryPlan &plan, std::uint64_t recycled);
+
+/// The plan of a field. It takes at most half the budget, if it can: its cache then has fewer
+/// slots, and kAuto leaves its stream on the host.
+///
+/// request      of the volume
+/// cache_slots  0: first_cache_slots()
+FieldPlan plan_field(const CompressedVolume &field, const MemoryRequest &request,
+                     std::uint64_t budget, std::uint32_t cache_slots);
 
 /// The plan with so many cache slots, and with the stream at the place of request.stream; kAuto: on
 /// the device.

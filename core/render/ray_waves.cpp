@@ -2,6 +2,8 @@
 
 #include <vector>
 
+#include "core/frame/field_values.hpp"
+
 namespace isowave::core {
 
 RaysWave::RaysWave(BlockStore &blocks, Wavefront &rays, std::uint32_t group_size, Solver solver,
@@ -61,11 +63,71 @@ void RaysWave::enqueue_pass() {
   blocks_.expect_requests();
 }
 
+BehindWave::BehindWave(BlockStore &blocks, Wavefront &rays, Layers &layers,
+                       std::uint32_t group_size, Solver solver)
+    : blocks_(blocks),
+      rays_(rays),
+      layers_(layers),
+      march_(blocks.device, rays.num_rays, group_size, solver, false, RaySource::kBehindHits,
+             blocks.cache.slot_type),
+      request_ahead_(blocks.device, rays.num_rays, group_size, false, RaySource::kBehindHits) {}
+
+void BehindWave::begin() {
+  const auto stage = blocks_.device.timer().stage("start_rays");
+  if (blocks_.has_requests()) rays_.forget_rays();
+  layers_.begin(rays_, is_first_layer_ ? rays_.hits : layers_.further_hits(), place_);
+  layers_.swap_hits(rays_, place_);
+}
+
+void BehindWave::enqueue_pass() {
+  ocl::StageTimer &timer = blocks_.device.timer();
+  rays_.open_pass();
+  blocks_.provide(rays_);
+  {
+    const auto stage = timer.stage("march");
+    march_(blocks_.levels[0].macrocells, blocks_.cache, rays_);
+  }
+  const auto stage = timer.stage("request");
+  request_ahead_(blocks_.levels[0].macrocells, blocks_.cache, rays_);
+  blocks_.expect_requests();
+}
+
 void SmoothNormalsWave::enqueue_pass() {
   rays_.open_pass();
   if (!begins_) blocks_.provide(rays_);
   const auto stage = blocks_.device.timer().stage("normals");
   normals_(blocks_.cache, rays_, begins_, source_);
+  begins_ = false;
+  blocks_.expect_requests();
+}
+
+void LayerNormalsWave::begin() {
+  const auto stage = blocks_.device.timer().stage("normals");
+  if (blocks_.has_requests()) rays_.forget_rays();
+  layers_.begin(rays_, rays_.hits);
+}
+
+void SliceValuesWave::set_layer(bool is_first, std::uint32_t first_surface) {
+  is_first_layer_ = is_first;
+  const VolumeInfo &volume = blocks_.levels[0].info;
+  FieldMap map = make_field_map({&volume, 1}, volume);
+  map.first_surface = first_surface;
+  values_.set_map(map);
+}
+
+void SliceValuesWave::begin() {
+  begins_ = is_first_layer_;
+  if (is_first_layer_) return;
+  const auto stage = blocks_.device.timer().stage("field");
+  if (blocks_.has_requests()) rays_.forget_rays();
+  layers_.begin(rays_, rays_.hits);
+}
+
+void SliceValuesWave::enqueue_pass() {
+  rays_.open_pass();
+  if (!begins_) blocks_.provide(rays_);
+  const auto stage = blocks_.device.timer().stage("field");
+  values_(rays_.frame, blocks_.cache, rays_, begins_);
   begins_ = false;
   blocks_.expect_requests();
 }

@@ -14,6 +14,8 @@
 #include "core/render/pipeline.hpp"
 #include "core/render/wave.hpp"
 #include "core/stages/ambient.hpp"
+#include "core/stages/field_values.hpp"
+#include "core/stages/layers.hpp"
 #include "core/stages/march.hpp"
 #include "core/stages/march_packets.hpp"
 #include "core/stages/request_ahead.hpp"
@@ -59,6 +61,33 @@ class RaysWave : public Wave {
   RequestAhead request_ahead_;
 };
 
+/// Rays that go on behind the hits of a surface, and replace them by the next ones.
+class BehindWave : public Wave {
+ public:
+  /// blocks, rays, layers: must outlive the wave.
+  BehindWave(BlockStore &blocks, Wavefront &rays, Layers &layers, std::uint32_t group_size,
+             Solver solver);
+
+  /// place  of the surface in innermost_first()
+  void set_surface(bool is_first_layer, std::size_t place) {
+    is_first_layer_ = is_first_layer;
+    place_ = place;
+  }
+  /// Leaves the surface's hits in rays.hits: see Layers::swap_hits().
+  void begin() override;
+  void enqueue_pass() override;
+  LaterPasses *sum_in(FrameStats &stats) const override { return &stats.behind; }
+
+ private:
+  BlockStore &blocks_;
+  Wavefront &rays_;
+  Layers &layers_;
+  March march_;
+  RequestAhead request_ahead_;
+  bool is_first_layer_ = true;
+  std::size_t place_ = 0;
+};
+
 /// Gives hits smooth gradients.
 class SmoothNormalsWave : public Wave {
  public:
@@ -71,12 +100,51 @@ class SmoothNormalsWave : public Wave {
   void enqueue_pass() override;
   LaterPasses *sum_in(FrameStats &stats) const override { return &stats.normals; }
 
- private:
+ protected:
   BlockStore &blocks_;
   Wavefront &rays_;
+
+ private:
   SmoothNormals &normals_;
   RaySource source_;
   bool begins_ = false;  ///< the next pass is the first
+};
+
+/// Gives the hits of a further layer, in rays.hits, smooth gradients.
+class LayerNormalsWave : public SmoothNormalsWave {
+ public:
+  LayerNormalsWave(BlockStore &blocks, Wavefront &rays, SmoothNormals &normals, Layers &layers)
+      : SmoothNormalsWave(blocks, rays, normals, RaySource::kCamera), layers_(layers) {}
+
+  void begin() override;
+
+ private:
+  Layers &layers_;
+};
+
+/// Gives the hits of a layer on slices, in rays.hits, the values of the voxels there.
+class SliceValuesWave : public Wave {
+ public:
+  /// blocks, rays, layers: must outlive the wave.
+  SliceValuesWave(BlockStore &blocks, Wavefront &rays, Layers &layers, std::uint32_t group_size)
+      : blocks_(blocks),
+        rays_(rays),
+        layers_(layers),
+        values_(blocks.device, rays.num_rays, group_size, blocks.cache.slot_type) {}
+
+  /// first_surface  the number of the first slice
+  void set_layer(bool is_first, std::uint32_t first_surface);
+  void begin() override;
+  void enqueue_pass() override;
+  LaterPasses *sum_in(FrameStats &stats) const override { return &stats.field; }
+
+ private:
+  BlockStore &blocks_;
+  Wavefront &rays_;
+  Layers &layers_;
+  FieldValues values_;
+  bool is_first_layer_ = true;
+  bool begins_ = false;  ///< the next pass is the first of all rays
 };
 
 /// A round of ambient rays: casts one ray from each hit.

@@ -43,28 +43,36 @@ RendererOptions checked(RendererOptions options, const CompressedVolume &volume,
     throw Error("a window of {} blocks cannot be used: {} (one dual grid) and more can",
                 options.window_blocks, kMinCacheSlots);
   }
+  if (options.max_surfaces > ISO_MAX_SURFACES)
+    throw Error("a frame has at most {} surfaces: {} are too many", ISO_MAX_SURFACES,
+                options.max_surfaces);
+  if (options.max_surfaces != 0 &&
+      (!options.pipeline->has_clipping() || options.solver.kind != ISO_SOLVER_BERNSTEIN))
+    throw Error(
+        "several and translucent surfaces are drawn by pipeline rays and solver bernstein: "
+        "leave out with_surfaces");
+  if (options.field != nullptr) {
+    check_volume_info(options.field->info, "the field");
+    if (volume.info.brick != BrickOf{} || options.field->info.brick != BrickOf{})
+      throw Error("bricks are drawn without colours by a field: leave out the field");
+    if (!options.pipeline->has_clipping())
+      throw Error("colours by a field are drawn by pipeline rays: leave out the field");
+    if (options.field->block_count() >= ISO_MAX_BLOCK_IDS)
+      throw Error("a field of {} blocks cannot be read: block ids end at {}",
+                  options.field->block_count(), ISO_MAX_BLOCK_IDS);
+  }
   if (options.largest_stream_part == 0) {
     options.largest_stream_part = device.capabilities().largest_allocation;
   }
   return options;
 }
 
-MemoryPlan make_plan(const ocl::Device &device, const CompressedVolume &volume,
-                     const RendererOptions &options) {
-  const MemoryRequest request{options.size.num_rays(),
-                              options.pipeline,
-                              options.group_size,
-                              options.stream,
-                              options.largest_stream_part,
-                              options.window_blocks,
-                              options.with_levels,
-                              options.with_bounds,
-                              options.with_kept_picture ? halved(options.size, 1).num_rays() : 0,
-                              options.with_given_rays,
-                              options.memory_budget == 0 && options.cache_slots == 0};
-  const std::uint64_t budget = options.memory_budget != 0
-                                   ? options.memory_budget
-                                   : device.capabilities().global_memory / 4 * 3;
+namespace {
+
+/// The plan of the renderer without its field.
+MemoryPlan plan_of_volume(const ocl::Device &device, const CompressedVolume &volume,
+                          const RendererOptions &options, const MemoryRequest &request,
+                          std::uint64_t budget) {
   std::uint64_t num_blocks = 0;
   for (const CompressedVolume *level : levels_of(volume, request.with_levels))
     num_blocks += level->block_count();
@@ -79,11 +87,44 @@ MemoryPlan make_plan(const ocl::Device &device, const CompressedVolume &volume,
     return plan;
   }
   const bool grows = options.memory_budget == 0;
-  const std::uint64_t most = grows ? kAmpleCacheSlots : std::uint64_t{ISO_MAX_CACHE_SLOTS};
+  const std::uint64_t ample = (options.max_surfaces != 0 ? kLayersFactor : 1) * kAmpleCacheSlots;
+  const std::uint64_t most = grows ? ample : std::uint64_t{ISO_MAX_CACHE_SLOTS};
   const auto max_slots =
       static_cast<std::uint32_t>(std::clamp<std::uint64_t>(num_blocks, kMinCacheSlots, most));
   return grows ? plan_to_grow(device, volume, request, budget, max_slots, options.first_slots)
                : plan_within(device, volume, request, budget, max_slots);
+}
+
+}  // namespace
+
+MemoryPlan make_plan(const ocl::Device &device, const CompressedVolume &volume,
+                     const RendererOptions &options) {
+  const MemoryRequest request{options.size.num_rays(),
+                              options.pipeline,
+                              options.group_size,
+                              options.stream,
+                              options.largest_stream_part,
+                              options.window_blocks,
+                              options.with_levels,
+                              options.with_bounds,
+                              options.with_kept_picture ? halved(options.size, 1).num_rays() : 0,
+                              options.with_given_rays,
+                              options.max_surfaces,
+                              options.memory_budget == 0 && options.cache_slots == 0,
+                              options.field != nullptr};
+  std::uint64_t budget = options.memory_budget != 0 ? options.memory_budget
+                                                    : device.capabilities().global_memory / 4 * 3;
+  if (options.field != nullptr) {
+    FieldPlan field = plan_field(*options.field, request, budget, options.field_slots);
+    if (field.bytes >= budget)
+      throw Error("a memory budget of {} bytes is too small: the field takes {} of them", budget,
+                  field.bytes);
+    budget -= field.bytes;
+    MemoryPlan plan = plan_of_volume(device, volume, options, request, budget);
+    plan.field = field;
+    return plan;
+  }
+  return plan_of_volume(device, volume, options, request, budget);
 }
 
 }  // namespace isowave::core

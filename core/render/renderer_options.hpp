@@ -37,7 +37,11 @@ struct RendererOptions {
   bool with_levels = false;        ///< frames may use the volume's levels of detail
   bool with_bounds = false;        ///< frames may draw bounds of the volume
   bool with_kept_picture = false;  ///< DeviceRenderer::keep_picture() will be called
-  bool with_given_rays = false;    ///< frames may have ambient rays, and rays may be cast
+  std::uint32_t max_surfaces = 0;  ///< most FrameRequest::surfaces of a frame
+  /// A second volume for FrameRequest::field_values; null: none. Must outlive the renderer.
+  const CompressedVolume *field = nullptr;
+  std::uint32_t field_slots = 0;  ///< of its cache, at least 8; 0: as many as frames need
+  bool with_given_rays = false;   ///< frames may have ambient rays, and rays may be cast
   /// Frames are drawn for pictures: else the kernels of smooth normals and of shade() are built
   /// when they are needed.
   bool with_shading = true;
@@ -48,6 +52,9 @@ struct RendererOptions {
 /// The most slots of a cache without a budget. They take 325 MiB of float32, with their share of
 /// the tables. A cold 720p frame of a 1024^3 volume touches about 400,000 blocks.
 inline constexpr std::uint32_t kAmpleCacheSlots = 1u << 20;
+/// Factor of kAmpleCacheSlots if frames may have layers: rays behind translucent surfaces come to
+/// most blocks with a surface.
+inline constexpr std::uint64_t kLayersFactor = 4;
 
 /// The options with their defaults filled in, except those that the memory plan decides. Throws
 /// Error if an option is out of range, or if volume or device cannot do what it asks for.

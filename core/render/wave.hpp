@@ -9,6 +9,8 @@
 
 namespace isowave::core {
 
+class BlockStore;
+
 /// Sets the mean number of blocks that so many rays of a pass were to look ahead at.
 inline void set_n_spec(PassStats &stats, uint rays_looking) {
   const uint rays = rays_in_window(stats.counts.window_count, rays_looking);
@@ -30,6 +32,8 @@ class Wave {
   virtual void enqueue_pass() = 0;
   /// Sum of the wave's passes in the statistics; none: FrameStats::passes lists each.
   virtual LaterPasses *sum_in(FrameStats & /*stats*/) const { return nullptr; }
+  /// The store of the blocks that it asks for; null: the renderer's.
+  virtual BlockStore *own_blocks() { return nullptr; }
   /// Adds to a pass's statistics the counts that depend on the way in which camera rays are traced.
   virtual void describe(PassStats & /*stats*/) const {}
 };

@@ -14,8 +14,6 @@ namespace isowave::core {
 
 namespace {
 
-constexpr std::string_view kGenerate = "generate:";
-
 GenerateOptions parse_generator(std::string_view text) {
   const auto fail = [&] {
     throw Error("'{}{}': write generate:FIELD_XxYxZ_TYPE or generate:FIELD_XxYxZ_TYPE:SEED",
@@ -160,8 +158,9 @@ CompressedVolume open_compressed_volume(const std::string &path, const RawOverri
 
 std::unique_ptr<VolumeReader> open_any_volume(const std::string &path,
                                               const RawOverrides &overrides,
-                                              const NoiseMaker &noise) {
-  if (!path.starts_with(kGenerate)) return open_volume(path, overrides);
+                                              const NoiseMaker &noise,
+                                              std::optional<std::uint32_t> step) {
+  if (!path.starts_with(kGenerate)) return open_volume(path, overrides, step);
   if (overrides.dims || overrides.type)
     throw Error("{}: it says dims and type itself: leave them out", path);
   GenerateOptions options = parse_generator(std::string_view(path).substr(kGenerate.size()));

@@ -65,11 +65,16 @@ void check_zfp_name(std::string_view path);
 /// Error also on what cannot be drawn.
 CompressedVolume open_compressed_volume(const std::string &path, const RawOverrides &overrides);
 
+/// How names of generated volumes begin.
+inline constexpr std::string_view kGenerate = "generate:";
+
 /// Opens a file (open_volume), or the generator that `generate:FIELD_XxYxZ_TYPE[:SEED]` names.
 ///
 /// noise  see GenerateOptions
+/// step   see open_volume()
 std::unique_ptr<VolumeReader> open_any_volume(const std::string &path,
                                               const RawOverrides &overrides,
-                                              const NoiseMaker &noise = {});
+                                              const NoiseMaker &noise = {},
+                                              std::optional<std::uint32_t> step = {});
 
 }  // namespace isowave::core

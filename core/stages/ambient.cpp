@@ -1,5 +1,7 @@
 #include "core/stages/ambient.hpp"
 
+#include <algorithm>
+
 namespace isowave::core {
 
 namespace {
@@ -14,7 +16,7 @@ ocl::Defines defines_of(bool placed) {
 
 ocl::BufferSizes Ambient::sizes() {
   return {ocl::buffer_size<AmbientDirection>("ambient directions",
-                                             ISO_MAX_AMBIENT_RAYS * ISO_AMBIENT_PATTERNS)};
+                                             2 * ISO_MAX_AMBIENT_RAYS * ISO_AMBIENT_PATTERNS)};
 }
 
 Ambient::Ambient(ocl::Device &device, std::uint64_t num_pixels, bool levels, bool placed)
@@ -22,20 +24,20 @@ Ambient::Ambient(ocl::Device &device, std::uint64_t num_pixels, bool levels, boo
       directions_(device, sizes()["ambient directions"]),
       kernel_(device, defines_of(placed), levels) {}
 
-void Ambient::begin(const VolumeInfo &info, std::size_t level, std::uint32_t num_rays) {
-  check_ambient_rays(num_rays);
+void Ambient::begin(const VolumeInfo &info, std::size_t level, const LightRays &light_rays) {
   level_ = static_cast<uint>(level);
-  params_ = make_ambient_params(info);
-  if (num_rays == num_rays_) return;
-  directions_.write(make_ambient_directions(num_rays));
-  num_rays_ = num_rays;
+  params_ = make_ambient_params(info, light_rays.num_ambient);
+  if (light_rays == light_rays_) return;
+  directions_.write(make_light_directions(light_rays));
+  light_rays_ = light_rays;
 }
 
 void Ambient::operator()(Wavefront &rays, std::uint32_t round) {
   kernel_.of(rays)(range_, rays.frame, rays.level_frames, rays.num_level_frames, rays.clip, level_,
-                   params_, directions_, round, num_rays_, rays.hits, rays.given_hits, rays.given,
-                   rays.open_counts);
-  rays.num_ambient = round;
+                   params_, directions_, round, light_rays_.count(), rays.hits, rays.given_hits,
+                   rays.given, rays.open_counts);
+  rays.num_ambient = std::min(round, light_rays_.num_ambient);
+  rays.num_shadow = round - rays.num_ambient;
 }
 
 }  // namespace isowave::core

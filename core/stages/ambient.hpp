@@ -1,5 +1,5 @@
 #pragma once
-// Rounds of ambient rays: how open hits are (kernels_cl/ambient.cl).
+// Rounds of ambient and shadow rays: how open hits are, and how lit (kernels_cl/ambient.cl).
 
 #include <cstdint>
 
@@ -19,21 +19,21 @@ class Ambient {
   /// Before the rounds of a frame.
   ///
   /// level  the finest level of detail that draws, whose grid is `info`
-  /// Waits  if the number of rays differs from that of the frame before
-  void begin(const VolumeInfo &info, std::size_t level, std::uint32_t num_rays);
+  /// Waits  if the rays differ from those of the frame before
+  void begin(const VolumeInfo &info, std::size_t level, const LightRays &light_rays);
 
   /// Counts the rays of round - 1 that met nothing, and makes the rays of a round, unless it is the
-  /// last: begin()'s num_rays.
+  /// last: the number of begin()'s rays.
   ///
   /// In     rays.hits of the frame; rays.given_hits of round - 1
-  /// Out    rays.open_counts, num_ambient; rays.given
+  /// Out    rays.open_counts, num_ambient, num_shadow; rays.given
   /// Waits  no
   void operator()(Wavefront &rays, std::uint32_t round);
 
  private:
   ocl::Range range_;
   ocl::Buffer<AmbientDirection> directions_;
-  std::uint32_t num_rays_ = 0;
+  LightRays light_rays_{};
   AmbientParams params_{};
   uint level_ = 0;
   LevelledKernel<kernels::ambient> kernel_;

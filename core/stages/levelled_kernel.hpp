@@ -48,7 +48,7 @@ class ClippedKernel {
       : device_(device),
         defines_(with_source(defines, source)),
         has_levels_(levels),
-        clips_(source == RaySource::kCamera),
+        clips_(source != RaySource::kGiven),
         whole_(device, defines_, levels) {}
 
   ocl::Kernel<Signature> &of(const Wavefront &rays) {

@@ -22,17 +22,22 @@ std::uint64_t num_items(std::uint64_t num_pixels) {
 ocl::BufferSizes Shade::sizes(std::uint64_t max_pixels) {
   // At least one position.
   const std::uint64_t bytes = std::max<std::uint64_t>(num_items(max_pixels) * 4 * sizeof(uint), 24);
-  return {ocl::buffer_size<std::byte>("framebuffer", bytes)};
+  return {ocl::buffer_size<std::byte>("framebuffer", bytes),
+          ocl::buffer_size<uint>("colour map", ISO_MAP_COLORS)};
 }
 
 Shade::Shade(ocl::Device &device, std::uint64_t max_pixels)
     : device_(device),
       staging_(device, sizes(max_pixels)["framebuffer"]),
+      color_map_(device, sizes(max_pixels)["colour map"]),
       shade_(device),
+      shade_layers_(device, group_defines(ocl::kGroupSize)),
       depths_(device),
       normals_(device),
       positions_(device),
-      memory_(ocl::pin_for(device)) {}
+      memory_(ocl::pin_for(device)) {
+  color_map_.write(on_device_);
+}
 
 void Shade::compile(Wavefront &rays) {
   for (const std::size_t num_pixels :
@@ -40,8 +45,8 @@ void Shade::compile(Wavefront &rays) {
     const auto range = [&](std::size_t items) {
       return ocl::Range::strided(items, ocl::kGroupSize, device_);
     };
-    shade_(range(num_items(num_pixels)), FrameParams{}, ShadeParams{}, 1, rays.hits,
-           rays.open_counts, 0u, 0u, staging_);
+    shade_(range(num_items(num_pixels)), FrameParams{}, ShadeParams{}, color_map_, 1, rays.hits,
+           rays.open_counts, 0u, 0u, rays.field_values, 0u, staging_);
     depths_(range(num_pixels), 0u, 0u, rays.hits, staging_);
     normals_(range(num_pixels / 3 + 1), ShadeParams{}, 0u, 0u, rays.hits, staging_);
   }
@@ -49,15 +54,25 @@ void Shade::compile(Wavefront &rays) {
 
 /// Enqueues the picture and its copy: RGBA if it is transparent or the image has words, else RGB.
 template <class T>
-void Shade::shade(const ShadeParams &params, Wavefront &rays, std::uint32_t samples,
-                  HostArray<T> &image) {
+void Shade::shade(const Shading &shading, Wavefront &rays, const ocl::Buffer<RayColor> *layers,
+                  std::uint32_t samples, HostArray<T> &image) {
+  const ShadeParams &params = shading.params;
+  if (params.has_map != 0 && shading.color_map != on_device_) {
+    on_device_ = shading.color_map;
+    color_map_.write(on_device_);
+  }
   constexpr bool kAsWords = sizeof(T) == sizeof(uint);
   const std::size_t num_pixels =
       std::size_t{rays.frame.view.width / samples} * (rays.frame.view.height / samples);
   image = memory_.array<T>(kAsWords ? num_pixels : num_channels(&params) * num_pixels);
-  shade_(ocl::Range::strided(num_items(num_pixels), ocl::kGroupSize, device_), rays.frame, params,
-         samples, rays.hits, rays.open_counts, rays.num_ambient,
-         kAsWords || params.transparent != 0 ? 1u : 0u, staging_);
+  const ocl::Range range = ocl::Range::strided(num_items(num_pixels), ocl::kGroupSize, device_);
+  const uint with_alpha = kAsWords || params.transparent != 0 ? 1u : 0u;
+  if (layers != nullptr) {
+    shade_layers_(range, rays.frame, params, samples, *layers, with_alpha, staging_);
+  } else {
+    shade_(range, rays.frame, params, color_map_, samples, rays.hits, rays.open_counts,
+           rays.num_ambient, rays.num_shadow, rays.field_values, with_alpha, staging_);
+  }
   staging_.read_async(std::as_writable_bytes(std::span(image.data(), image.size())), copied_);
 }
 
@@ -74,14 +89,15 @@ void Shade::copy_parts(HostArray<T> &values, std::size_t num_rays, const Launch 
   }
 }
 
-FrameArrays Shade::operator()(const WantedArrays &wanted, const ShadeParams &params,
-                              const HitMap &map, Wavefront &rays, std::uint32_t samples) {
+FrameArrays Shade::operator()(const WantedArrays &wanted, const Shading &shading, const HitMap &map,
+                              Wavefront &rays, const ocl::Buffer<RayColor> *layers,
+                              std::uint32_t samples) {
   const std::size_t num_rays = std::size_t{rays.frame.view.width} * rays.frame.view.height;
   const auto range = [&](uint count) {
     return ocl::Range::strided(count, ocl::kGroupSize, device_);
   };
   ocl::InFlight<FrameArrays> arrays(device_);
-  if (wanted.picture) shade(params, rays, samples, arrays->picture);
+  if (wanted.picture) shade(shading, rays, layers, samples, arrays->picture);
   if (wanted.depth) {
     copy_parts(arrays->depth, num_rays, [&](uint begin, uint count) {
       depths_(range(count), begin, count, rays.hits, staging_);
@@ -89,8 +105,12 @@ FrameArrays Shade::operator()(const WantedArrays &wanted, const ShadeParams &par
   }
   if (wanted.normals) {
     copy_parts(arrays->normals, num_rays, [&](uint begin, uint count) {
-      normals_(range(count), params, begin, count, rays.hits, staging_);
+      normals_(range(count), shading.params, begin, count, rays.hits, staging_);
     });
+  }
+  if (wanted.field_values) {
+    arrays->field_values = memory_.array<float>(num_rays);
+    rays.field_values.read(std::span(arrays->field_values.data(), num_rays));
   }
   const bool has_doubles = HitPositions::suits(device_);
   if (wanted.positions && has_doubles) {
@@ -101,16 +121,17 @@ FrameArrays Shade::operator()(const WantedArrays &wanted, const ShadeParams &par
   if (wanted.positions && !has_doubles) {
     std::vector<HitRecord> hits(num_rays);
     rays.hits.read(hits);
-    add_hit_arrays({.positions = true}, hits, params, &map, memory_, *arrays);
+    add_hit_arrays({.positions = true}, hits, shading.params, &map, memory_, *arrays);
   }
   return std::move(*arrays);
 }
 
-HostArray<uint> Shade::packed(const ShadeParams &params, Wavefront &rays, std::uint32_t samples) {
-  ocl::InFlight<HostArray<uint>> colors(device_);
-  shade(params, rays, samples, *colors);
+HostArray<uint> Shade::packed(const Shading &shading, Wavefront &rays,
+                              const ocl::Buffer<RayColor> *layers, std::uint32_t samples) {
+  ocl::InFlight<HostArray<uint>> image(device_);
+  shade(shading, rays, layers, samples, *image);
   copied_.wait();
-  return std::move(*colors);
+  return std::move(*image);
 }
 
 }  // namespace isowave::core

@@ -5,8 +5,10 @@
 #include <cstdint>
 
 #include "core/frame/frame_arrays.hpp"
+#include "core/frame/surfaces.hpp"
 #include "core/stages/hit_positions.hpp"
 #include "core/stages/wavefront.hpp"
+#include "kernels/layers.hpp"
 #include "kernels/shade.hpp"
 
 namespace isowave::core {
@@ -21,29 +23,36 @@ class Shade {
   /// compiled when they are first wanted.
   void compile(Wavefront &rays);
 
-  /// The arrays of rays.hits; pictures with the ambient light that rays.open_counts lets through.
+  /// The arrays of rays.hits; pictures with the ambient light that rays.open_counts lets through,
+  /// or of layers.
   ///
+  /// layers   colours of rays; null: the frame has none
   /// samples  rays a pixel along each axis
   /// map      for positions
   /// Waits    once
-  FrameArrays operator()(const WantedArrays &wanted, const ShadeParams &params, const HitMap &map,
-                         Wavefront &rays, std::uint32_t samples);
+  FrameArrays operator()(const WantedArrays &wanted, const Shading &shading, const HitMap &map,
+                         Wavefront &rays, const ocl::Buffer<RayColor> *layers,
+                         std::uint32_t samples);
   /// The picture as RGBA, red in bits 0..7, see shade_pixel(). A is 0 if no ray of a pixel hits.
   ///
   /// Waits  yes
-  HostArray<uint> packed(const ShadeParams &params, Wavefront &rays, std::uint32_t samples);
+  HostArray<uint> packed(const Shading &shading, Wavefront &rays,
+                         const ocl::Buffer<RayColor> *layers, std::uint32_t samples);
 
  private:
   template <class T>
-  void shade(const ShadeParams &params, Wavefront &rays, std::uint32_t samples,
-             HostArray<T> &image);
+  void shade(const Shading &shading, Wavefront &rays, const ocl::Buffer<RayColor> *layers,
+             std::uint32_t samples, HostArray<T> &image);
   template <class T, class Launch>
   void copy_parts(HostArray<T> &values, std::size_t num_rays, const Launch &launch);
 
   ocl::Device &device_;
   /// The picture, or parts of other arrays, on their way to the host.
   ocl::Buffer<std::byte> staging_;
+  ocl::Buffer<uint> color_map_;  ///< [ISO_MAP_COLORS] on_device_
+  ColorTable on_device_{};
   ocl::Kernel<kernels::shade> shade_;
+  ocl::Kernel<kernels::layers_shade> shade_layers_;
   ocl::Kernel<kernels::hit_depths> depths_;
   ocl::Kernel<kernels::hit_normals> normals_;
   HitPositions positions_;

@@ -12,12 +12,14 @@ namespace isowave::core {
 /// The source of the rays of pipeline `rays`.
 enum class RaySource {
   kCamera,
-  kGiven  ///< Wavefront::given
+  kGiven,      ///< Wavefront::given
+  kBehindHits  ///< the camera's, from their hits on (core/stages/layers.hpp)
 };
 
 /// The macro for the kernels that make rays.
 inline ocl::Defines with_source(ocl::Defines defines, RaySource source) {
   if (source == RaySource::kGiven) defines.insert({"ISO_GIVEN_RAYS", "1"});
+  if (source == RaySource::kBehindHits) defines.insert({"ISO_BEHIND_HITS", "1"});
   return defines;
 }
 
@@ -28,6 +30,7 @@ struct Wavefront {
     bool with_pairs = true;      ///< pipeline `blocks` needs the arrays of ray-block pairs
     std::size_t num_levels = 1;  ///< of detail
     bool with_given = false;     ///< there may be rays of RaySource::kGiven
+    bool with_field = false;     ///< hits may have values of a field
     bool with_walks = true;      ///< rays walk from block to block: false if triangles are drawn
     bool scanned_pairs = false;  ///< there may be frames with Schedule::scanned_pairs
   };
@@ -96,8 +99,9 @@ struct Wavefront {
   ocl::Buffer<HitRecord> hits;        ///< [R] by pixel: the picture so far
   ocl::Buffer<GivenRay> given;        ///< [R] of any origin; empty unless there may be some
   ocl::Buffer<HitRecord> given_hits;  ///< [R] hits of given rays
-  ocl::Buffer<uchar> open_counts;   ///< [R] by pixel: ambient rays of its hit that met nothing ...
-  std::uint32_t num_ambient = 0;    ///< ... of so many; 0: the frame has none
+  ocl::Buffer<uchar> open_counts;     ///< [2][R] by pixel: see shade_pixel()
+  std::uint32_t num_ambient = 0, num_shadow = 0;
+  ocl::Buffer<float> field_values;  ///< [R] by pixel: see field_value.h; empty without a field
   ocl::Buffer<uint> ray_block_ids;  ///< [R] by pixel: where a ray goes on from: RayStand (R_BID)
   ocl::Buffer<uint>
       active_ray_ids;  ///< [active_count] rays at work: RayEntry of ray_state.h (R_ID)

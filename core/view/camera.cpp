@@ -5,13 +5,11 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <numbers>
-#include <set>
-#include <span>
 #include <string>
 #include <vector>
 
 #include "core/base/error.hpp"
-#include "core/io/input_file.hpp"
+#include "core/io/json_file.hpp"
 
 namespace isowave::core {
 namespace {
@@ -23,6 +21,8 @@ constexpr double kMinSinViewUp = 1e-6;
 /// Greatest length of eye to at, and of up. Squares of longer vectors, and of vectors as much
 /// shorter than 1, leave double's range.
 constexpr double kLongest = 0x1p500;
+/// Largest camera file [bytes]: 30,000 cameras.
+constexpr std::uint64_t kMostBytes = 4u << 20;
 
 const json &member(const json &object, const char *key, const std::string &where) {
   if (!object.is_object()) throw Error("{}: expected an object with \"{}\"", where, key);
@@ -58,34 +58,6 @@ glm::uvec3 size3(const json &value, const char *key, const std::string &where) {
   const json &v = triple(value, key, where);
   return {positive_uint(v[0], key, where), positive_uint(v[1], key, where),
           positive_uint(v[2], key, where)};
-}
-
-json parse_file(const std::filesystem::path &path) {
-  constexpr std::uint64_t kMostBytes =
-      4u << 20;  // 30,000 cameras. Parsed, it may take 80 times as much memory
-  const InputFile file(path);
-  if (file.size() > kMostBytes)
-    throw Error("{}: not a camera file: it has more than {} bytes", file.what(), kMostBytes);
-  std::string text(file.size(), '\0');
-  file.read(0, std::as_writable_bytes(std::span(text)));
-  if (const std::size_t zero = text.find('\0');
-      zero != text.npos)  // the parser would take it for the end
-    throw Error("{}: not a camera file: no JSON from byte {} on", file.what(), zero + 1);
-  std::vector<std::set<std::string>> keys;  // of the objects that have begun, and not ended
-  const auto refuse_twice = [&](int, json::parse_event_t event, const json &parsed) {
-    if (event == json::parse_event_t::object_start) keys.emplace_back();
-    if (event == json::parse_event_t::object_end) keys.pop_back();
-    if (event == json::parse_event_t::key && !keys.back().insert(parsed.get<std::string>()).second)
-      throw Error("{}: {} is given twice", file.what(), parsed.dump().substr(0, 60));
-    return true;
-  };
-  try {
-    return json::parse(text, refuse_twice);
-  } catch (const json::parse_error &error) {
-    throw Error("{}: not a camera file: no JSON from byte {} on", file.what(), error.byte);
-  } catch (const json::out_of_range &) {
-    throw Error("{}: not a camera file: it holds a number that is too large", file.what());
-  }
 }
 
 bool finite(const glm::dvec3 &v) {
@@ -174,7 +146,7 @@ double pixel_size_at(const Camera &camera, std::uint32_t height, double distance
 
 CameraFile read_camera_file(const std::filesystem::path &path) {
   const std::string where = path.string();
-  const json root = parse_file(path);
+  const json root = read_json(path, "camera file", kMostBytes);
 
   CameraFile file;
   const double fovy_deg = number(member(root, "fovy_deg", where), "fovy_deg", where);
@@ -210,6 +182,10 @@ namespace {
 constexpr double kElevation = 20.0 * std::numbers::pi / 180.0, kFirstAzimuth = 0.3;
 constexpr double kFovyDeg = 60.0;
 
+double azimuth_of(std::uint32_t view, std::uint32_t num_views) {
+  return 2.0 * std::numbers::pi * view / num_views + kFirstAzimuth;
+}
+
 /// From the point looked at, of length 1.
 glm::dvec3 towards_eye(double azimuth) {
   return {std::cos(kElevation) * std::sin(azimuth), std::sin(kElevation),
@@ -219,23 +195,32 @@ glm::dvec3 towards_eye(double azimuth) {
 }  // namespace
 
 Camera camera_of_box(const VolumeInfo &info, const glm::dvec3 &begin, const glm::dvec3 &end,
-                     double aspect, double margin) {
+                     double aspect, std::uint32_t num_views, double margin) {
   const glm::dmat3 to_world = info.index_to_world();
-  const glm::dvec3 up(0.0, 1.0, 0.0), back = towards_eye(kFirstAzimuth);
-  const glm::dvec3 right = glm::normalize(glm::cross(up, back)), above = glm::cross(back, right);
+  const glm::dvec3 up(0.0, 1.0, 0.0);
   const glm::dvec3 centre = info.origin + to_world * (0.5 * (begin + end));
   const double tan_v = margin * std::tan(glm::radians(kFovyDeg) / 2), tan_u = aspect * tan_v;
   // From so far that each corner is within the picture, or its mirror image on the other side.
   double distance = 0;
-  for (int corner = 0; corner < 8; ++corner) {
-    const glm::dvec3 half(corner & 1 ? 0.5 : -0.5, corner & 2 ? 0.5 : -0.5,
-                          corner & 4 ? 0.5 : -0.5);
-    const glm::dvec3 at = to_world * (half * (end - begin));
-    const double nearer = glm::dot(at, back);
-    distance = std::max({distance, nearer + std::abs(glm::dot(at, right)) / tan_u,
-                         nearer + std::abs(glm::dot(at, above)) / tan_v});
+  for (std::uint32_t view = 0; view < num_views; ++view) {
+    const glm::dvec3 back = towards_eye(azimuth_of(view, num_views));
+    const glm::dvec3 right = glm::normalize(glm::cross(up, back)), above = glm::cross(back, right);
+    for (int corner = 0; corner < 8; ++corner) {
+      const glm::dvec3 half(corner & 1 ? 0.5 : -0.5, corner & 2 ? 0.5 : -0.5,
+                            corner & 4 ? 0.5 : -0.5);
+      const glm::dvec3 at = to_world * (half * (end - begin));
+      const double nearer = glm::dot(at, back);
+      distance = std::max({distance, nearer + std::abs(glm::dot(at, right)) / tan_u,
+                           nearer + std::abs(glm::dot(at, above)) / tan_v});
+    }
   }
-  return {centre + distance * back, centre, up, kFovyDeg};
+  return {centre + distance * towards_eye(kFirstAzimuth), centre, up, kFovyDeg};
+}
+
+std::vector<Camera> turntable(const Camera &first, std::uint32_t n) {
+  std::vector<Camera> cameras{first};
+  for (std::uint32_t k = 1; k < n; ++k) cameras.push_back(turned(first, 360.0 * k / n));
+  return cameras;
 }
 
 std::vector<Camera> orbit_cameras(const VolumeInfo &info, std::uint32_t n) {
@@ -248,9 +233,8 @@ std::vector<Camera> orbit_cameras(const VolumeInfo &info, std::uint32_t n) {
   std::vector<Camera> cameras;
   cameras.reserve(n);
   for (std::uint32_t k = 0; k < n; ++k) {
-    const double azimuth = 2.0 * std::numbers::pi * k / n + kFirstAzimuth;
     cameras.push_back(
-        {centre + distance * towards_eye(azimuth), centre, {0.0, 1.0, 0.0}, kFovyDeg});
+        {centre + distance * towards_eye(azimuth_of(k, n)), centre, {0.0, 1.0, 0.0}, kFovyDeg});
   }
   return cameras;
 }

@@ -11,6 +11,9 @@
 
 namespace isowave::core {
 
+/// Most views around a volume that can be asked for.
+inline constexpr std::uint32_t kMostViews = 100'000;
+
 /// A camera in world space: a pinhole, or parallel projection.
 struct Camera {
   glm::dvec3 eye{0.0}, at{0.0, 0.0, -1.0}, up{0.0, 1.0, 0.0};
@@ -72,8 +75,13 @@ glm::dvec3 point_of_ray(const Camera &camera, const glm::dvec2 &pixels, std::uin
 ///
 /// begin, end  corners of the box [voxels], index space
 /// aspect      width of the picture / its height
+/// num_views   from so far that the box is in each view of turntable()
 Camera camera_of_box(const VolumeInfo &info, const glm::dvec3 &begin, const glm::dvec3 &end,
-                     double aspect, double margin = 0.95);
+                     double aspect, std::uint32_t num_views = 1, double margin = 0.95);
+
+/// n views once around what the first of them looks at, about its axis `up`, anticlockwise from
+/// above: view k is turned by 360 k/n degrees.
+std::vector<Camera> turntable(const Camera &first, std::uint32_t n);
 
 /// n eyes about the world +y axis through the box centre: azimuth 2*pi*k/n + 0.3 (0 looks from +z;
 /// x grows with sin), elevation 20 degrees, distance 0.8 box diagonals from the box centre,

@@ -35,18 +35,20 @@ std::array<ClipPlane, 6> box_planes(const glm::dvec3 &begin, const glm::dvec3 &e
   return planes;
 }
 
+void check_plane(const ClipPlane &plane, std::string_view what) {
+  const double length = glm::length(plane.normal);
+  if (!(length > 1 / kLongestNormal && length < kLongestNormal))
+    throw Error("{}'s normal is {} {} {}: give a direction", what, plane.normal.x, plane.normal.y,
+                plane.normal.z);
+  if (!std::isfinite(plane.offset))
+    throw Error("{}'s offset is {}: give a number", what, plane.offset);
+}
+
 void check_clip(const Clip &clip) {
   if (clip.planes.size() > ISO_MAX_CLIP_PLANES)
     throw Error("{} clipping planes: up to {} can be drawn", clip.planes.size(),
                 ISO_MAX_CLIP_PLANES);
-  for (const ClipPlane &plane : clip.planes) {
-    const double length = glm::length(plane.normal);
-    if (!(length > 1 / kLongestNormal && length < kLongestNormal))
-      throw Error("a clipping plane's normal is {} {} {}: give a direction", plane.normal.x,
-                  plane.normal.y, plane.normal.z);
-    if (!std::isfinite(plane.offset))
-      throw Error("a clipping plane's offset is {}: give a number", plane.offset);
-  }
+  for (const ClipPlane &plane : clip.planes) check_plane(plane, "a clipping plane");
 }
 
 ClipParams make_clip_params(const VolumeInfo &finest, const View &view, const Camera &camera,

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <glm/glm.hpp>
+#include <string_view>
 #include <vector>
 
 #include "core/view/camera.hpp"
@@ -33,6 +34,9 @@ struct Clip {
 ///
 /// Throws  Error: the box has no inside
 std::array<ClipPlane, 6> box_planes(const glm::dvec3 &begin, const glm::dvec3 &end);
+
+/// Throws  Error about `what`: the plane has no direction, or no place
+void check_plane(const ClipPlane &plane, std::string_view what);
 
 /// Throws  Error: too many planes, or a degenerate one
 void check_clip(const Clip &clip);

@@ -47,6 +47,17 @@ std::uint64_t joined_no_data_words(std::span<const CompressedVolume *const> leve
 /// Grid parameters of each level, with the places of its blocks, ranges and masks among those of
 /// all levels.
 std::vector<FrameParams> make_level_grids(std::span<const VolumeInfo> levels);
+
+/// Gives a map from hits (HitMap, FieldMap) the places of the levels' blocks.
+template <class Map>
+void set_level_places(std::span<const VolumeInfo> levels, Map &map) {
+  const std::vector<FrameParams> grids = make_level_grids(levels);
+  map.blocks_x = grids.front().place.blocks_x;
+  map.blocks_y = grids.front().place.blocks_y;
+  map.num_levels = static_cast<uint>(grids.size());
+  for (std::size_t level = 0; level < grids.size(); ++level)
+    map.begin_z[level] = grids[level].place.begin_z;
+}
 /// All levels' ids as those of one grid: its blocks are as many along x and y as the finest
 /// level's.
 BlockGrid make_id_grid(std::span<const FrameParams> level_grids);

@@ -34,16 +34,22 @@ ISO_INLINE RayEvent ray_exit(const Ray *ray, RayEvent exit) {
   return ends_ray(ray, exit) ? ray_end(ray) : exit;
 }
 
-/// Does the ray stand where it begins in a level, with a side that it was on before?
-ISO_INLINE int has_side(uint side) {
-  return ISO_INTERVALS && side != ISO_SIDE_UNKNOWN;
+/// Does the ray stand at its last hit?
+ISO_INLINE int is_at_hit(uint side) {
+  return ISO_BEHIND_HITS && side == ISO_AT_HIT;
 }
 
-/// The place where a ray stands: without intervals a block, and no side.
+/// Does the ray stand where it begins in a level, with a side that it was on before?
+ISO_INLINE int has_side(uint side) {
+  return ISO_INTERVALS && side != ISO_SIDE_UNKNOWN && !is_at_hit(side);
+}
+
+/// The place where a ray stands: a block, and no side unless kernels have any.
 ISO_INLINE RayStand read_stand(uint stand) {
   RayStand at;
-  at.block_id = ISO_LEVELS || ISO_CLIP ? unpack_stand(stand).block_id : stand;
-  at.side = ISO_LEVELS || ISO_CLIP ? unpack_stand(stand).side : ISO_SIDE_UNKNOWN;
+  const int is_packed = ISO_LEVELS || ISO_CLIP || ISO_BEHIND_HITS;
+  at.block_id = is_packed ? unpack_stand(stand).block_id : stand;
+  at.side = is_packed ? unpack_stand(stand).side : ISO_SIDE_UNKNOWN;
   return at;
 }
 

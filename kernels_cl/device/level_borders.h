@@ -135,13 +135,13 @@ ISO_INLINE uint cross_borders(global const FrameParams *frames, uint num_frames,
   const FrameParams *frame = ((void)frames, (void)num_frames, &frame_params)
 #endif
 
-/// find_blocks() for a ray that stands at block *block_id. A ray with a side looks into this block
-/// even if the block is not active.
+/// find_blocks() for a ray that stands at block *block_id. A ray with a side, or at a hit, which
+/// may be a cap, looks into this block even if the block is not active.
 ISO_INLINE uint find_blocks_from(const FrameParams *frame, global const uint *macrocell_masks,
                                  const Ray *ray, uint side, uint *block_id, uint wanted,
                                  local uint *found) {
   uint first = 0;
-  if (has_side(side)) {
+  if (has_side(side) || is_at_hit(side)) {
     found[0] = *block_id;
     first = 1;
     *block_id = block_behind(frame, ray, block_coords(frame, *block_id), last_planes(frame));

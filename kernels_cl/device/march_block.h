@@ -8,6 +8,7 @@
 #include "portable/block_table.h"
 #include "portable/cell_intersect.h"
 #include "portable/clip.h"
+#include "portable/layers.h"
 #include "slot_values.h"
 
 /// The cache (block_cache.cl), as a work-item looks into it.
@@ -45,6 +46,7 @@ typedef struct BlockChange {
   CellWalk at;
   float w[8];
   int at_border;  ///< the change is where the ray begins: two levels disagree, or it is a cap
+  uint number;    ///< of the change among those in its cell
 } BlockChange;
 
 ISO_INLINE int changes_at_border(const BlockChange *found) {
@@ -123,17 +125,42 @@ ISO_INLINE int tells_side(int ends) {
   return ISO_BANDS && ends;
 }
 
+/// Finds change number found->number of inside in a cell. Kernels whose rays do not go on behind
+/// hits find the first.
+///
+/// precise  as march_block()
+ISO_INLINE int find_change(const Ray *ray, const GridWalk *cell, RayEvent exit, int precise,
+                           BlockChange *found) {
+#if ISO_BEHIND_HITS
+  return numbered_change_in_cell(ray, found->w, cell->x, cell->y, cell->z, found->at.enter, exit,
+                                 found->number, precise, &found->change);
+#else
+  const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
+  return precise ? change_in_cell(solver, ray, found->w, cell->x, cell->y, cell->z, found->at.enter,
+                                  exit, &found->change)
+                 : change_or_doubt_in_cell(solver, ray, found->w, cell->x, cell->y, cell->z,
+                                           found->at.enter, exit, &found->change);
+#endif
+}
+
+/// The ray's way through the cells of block b behind a hit in it, which has HitRecord::cell `cell`.
+ISO_INLINE CellWalk start_at_hit(const Ray *ray, BlockCoords b, uint cell, LastPlanes last) {
+  const int x = (int)(4 * b.x + (cell & 3u)), y = (int)(4 * b.y + (cell >> 2 & 3u)),
+            z = (int)(4 * b.z + (cell >> 4 & 3u));
+  return start_at_cell(ray, x, y, z, ray_entry(ray, region_entry(ray, x, y, z, 1, last)), last);
+}
+
 /// Walks the cells of block b, and stamps it if it is cached.
 ///
 /// precise  doubts are settled on the spot
-/// side     where the ray was before it begins in this block
+/// side     where the ray was before it begins in this block, or ISO_AT_HIT
+/// hit_cell HitRecord::cell of the hit that the ray then stands at
 /// may_end  the ray may end in this block
 /// Returns  ISO_RAY_LEFT (the block), ISO_RAY_HIT, ISO_RAY_DOUBT, ISO_RAY_WAITS if a block of the
 ///          dual grid is not cached, or how the ray ends
 ISO_INLINE int march_block(const FrameParams *frame, const CacheReader *cache, const Ray *ray,
-                           LastPlanes last, BlockCoords b, int precise, uint side, int may_end,
-                           BlockChange *found) {
-  const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
+                           LastPlanes last, BlockCoords b, int precise, uint side, uint hit_cell,
+                           int may_end, BlockChange *found) {
   uint have; /* corners of the dual grid */
   int result = ISO_RAY_LEFT;
   const ulong cells = open_block(frame, cache, b, &have);
@@ -142,10 +169,15 @@ ISO_INLINE int march_block(const FrameParams *frame, const CacheReader *cache, c
   const GridWalk block = walk_from(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
   const int ends = may_end && ends_ray(ray, walk_exit(&block, ray));
   if (cells == 0 && !has_side(side) && !tells_side(ends)) return ISO_RAY_LEFT;
-  const RayEvent enter = ray_entry(ray, region_entry(ray, (int)b.x, (int)b.y, (int)b.z, 4, last));
   const GridWalk *cell = &found->at.cell;
-  found->at = enter_cells(ray, b, enter, last);
+  if (is_at_hit(side)) {
+    found->at = start_at_hit(ray, b, hit_cell, last);
+  } else {
+    const RayEvent enter = ray_entry(ray, region_entry(ray, (int)b.x, (int)b.y, (int)b.z, 4, last));
+    found->at = enter_cells(ray, b, enter, last);
+  }
   found->at_border = 0;
+  found->number = is_at_hit(side) ? crossings_up_to_cell(hit_cell) : 0u;
   do {
     const int x = cell->x & 3, y = cell->y & 3, z = cell->z & 3;
     const int ends_here = ends && ends_ray(ray, found->at.exit);
@@ -165,12 +197,8 @@ ISO_INLINE int march_block(const FrameParams *frame, const CacheReader *cache, c
         if (has_side(side))
           found->at_border = inside_at(ray, found->w, found->at.enter, cell->x, cell->y, cell->z,
                                        0) != (side == ISO_SIDE_INSIDE);
-        result = changes_at_border(found) ? ISO_RAY_HIT
-                 : precise
-                     ? change_in_cell(solver, ray, found->w, cell->x, cell->y, cell->z,
-                                      found->at.enter, exit, &found->change)
-                     : change_or_doubt_in_cell(solver, ray, found->w, cell->x, cell->y, cell->z,
-                                               found->at.enter, exit, &found->change);
+        result =
+            changes_at_border(found) ? ISO_RAY_HIT : find_change(ray, cell, exit, precise, found);
         if (result == ISO_RAY_LEFT && tells_side(ends_here))
           result = ISO_NO_DATA && lacks_data(found->w) ? ISO_RAY_ENDS
                    : inside_at(ray, found->w, exit, cell->x, cell->y, cell->z, 1)
@@ -180,6 +208,7 @@ ISO_INLINE int march_block(const FrameParams *frame, const CacheReader *cache, c
     }
     if (result == ISO_RAY_LEFT && ends_here) result = ISO_RAY_ENDS;
     side = ISO_SIDE_UNKNOWN;
+    if (result == ISO_RAY_LEFT) found->number = 0;
   } while (result == ISO_RAY_LEFT && next_cell(&found->at, ray, last));
   return result;
 }
@@ -206,6 +235,7 @@ ISO_INLINE HitRecord hit_of(const FrameParams *frame, global const ClipParams *c
   HitRecord hit = make_hit(frame, ray, found->w, found->at.cell.x, found->at.cell.y,
                            found->at.cell.z, found->at.enter, ray_exit(ray, found->at.exit), s);
   if (changes_at_border(found) && begins_at_cap(clip, ray)) cap_hit(clip, ray, &hit);
+  if (ISO_BEHIND_HITS) hit.cell |= found->number << ISO_CROSSING_BIT;
   return hit;
 }
 

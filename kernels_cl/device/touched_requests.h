@@ -49,6 +49,25 @@ ISO_INLINE void request_corners(const FrameParams *frame, BlockCoords b, uint co
   }
 }
 
+/// Asks for the missing ones of the touched corners; the others stay.
+///
+/// place  of the ray among those that wait: the first one is named in *cache
+/// slots  [8] of the corners, ISO_GROUP_SIZE apart
+ISO_INLINE void request_missing(const FrameParams *frame, BlockCoords b, uint touched, uint missing,
+                                uint place, uint needed, local const uint *slots,
+                                global uint *slot_stamps, Requests requests,
+                                global CacheState *cache) {
+  for (uint corner = 0; corner < 8; ++corner) {
+    if ((touched & ~missing & 1u << corner) != 0)
+      stamp_needed(slot_stamps, slots[corner * ISO_GROUP_SIZE], needed);
+  }
+  request_corners(frame, b, unasked_corners(frame, b, missing, requests), requests);
+  if (place == 0) {
+    cache->first_block_id = block_id_at(frame, b.x, b.y, b.z);
+    cache->first_touched = touched;
+  }
+}
+
 /// Adds what the work-group has collected to the list. All items must call it.
 /// list_begin: scratch of the work-group.
 ISO_INLINE void list_staged(const FrameParams *frame, Requests requests, local uint *list_begin) {

@@ -1,4 +1,5 @@
-/// ambient.h -- the rays that find out how much of the sky a hit sees: how open it is.
+/// ambient.h -- the rays that find out how much light a hit gets: how much of the sky it sees, and
+/// how much of the scene's light.
 ///
 /// Portable: OpenCL C 1.2 and C++.
 ///
@@ -8,6 +9,10 @@
 /// all around would add to a matt surface. They come from a table: a spiral, one of its
 /// ISO_AMBIENT_PATTERNS turns for each pixel of a tile of 4 x 4, so that neighbours see different
 /// parts of the sky and together all of it.
+///
+/// Shadow rays follow: they begin at the same place, and go towards the light, or for soft shadows
+/// to all parts of a disk around it. They are lit if they meet no surface. A hit on a side that
+/// faces away from the light has none.
 #ifndef ISOWAVE_AMBIENT_H
 #define ISOWAVE_AMBIENT_H
 
@@ -23,10 +28,11 @@ typedef struct AmbientParams {
   float normal[9];  ///< row-major: gradient in index space -> normal in world space, up to a factor
   float view[9];    ///< row-major: direction in index space -> world space, up to a factor
   float to_index[9];  ///< row-major: back
+  uint num_ambient;   ///< ambient rays of each hit; its further rays are shadow rays
 } AmbientParams;
-ISO_CHECK_SIZE(AmbientParams, 108);
+ISO_CHECK_SIZE(AmbientParams, 112);
 
-/// A direction of length 1, z along the normal.
+/// A direction of length 1: z along the normal, or of a shadow ray in world space.
 typedef struct AmbientDirection {
   float x, y, z;
 } AmbientDirection;
@@ -112,13 +118,20 @@ ISO_INLINE HitRecord placed_hit(const FrameParams *of_level, uint level, HitReco
   return hit;
 }
 
-/// An ambient ray of a pixel's hit.
+/// Is a hit's ray of that number a shadow ray?
+ISO_INLINE int is_shadow_ray(const AmbientParams *p, uint number) {
+  return number >= p->num_ambient;
+}
+
+/// An ambient or shadow ray of a pixel's hit; a shadow ray of a hit that faces away from its
+/// direction is none.
 ///
 /// frame      of the camera
 /// placed     see placed_hit()
+/// number     of the ray
 /// direction  see ambient_pattern()
 ISO_INLINE GivenRay ambient_ray(const FrameParams *frame, const AmbientParams *p, HitRecord placed,
-                                uint pixel, AmbientDirection direction) {
+                                uint pixel, uint number, AmbientDirection direction) {
   const Ray ray = make_ray(frame, pixel);
   GivenRay given;
   AmbientDirection normal, up, d;
@@ -126,7 +139,8 @@ ISO_INLINE GivenRay ambient_ray(const FrameParams *frame, const AmbientParams *p
   uint i;
   normal = seen_normal(p, &ray, placed);
   up = normalized(turned(p->to_index, normal.x, normal.y, normal.z));
-  d = around(normal, direction);
+  if (is_shadow_ray(p, number) && !(inner_product(normal, direction) > 0.0f)) return no_ray();
+  d = is_shadow_ray(p, number) ? direction : around(normal, direction);
   d = turned(p->to_index, d.x, d.y, d.z);
   for (i = 0; i < placed.cell; ++i) scale *= 0.5f;
   given.o_x = fma(up.x, ISO_AMBIENT_LIFT, placed.x);

@@ -133,6 +133,25 @@ ISO_INLINE int change_in_cell(Solver solver, const Ray *r, const float *w, int x
                            change->cubic, &change->bracket);
 }
 
+/// Finds change number `number` of inside, 0: the first, as change_or_doubt_in_cell() and
+/// change_in_cell() find the first. For `bernstein`.
+///
+/// precise  there is no doubt
+ISO_INLINE int numbered_change_in_cell(const Ray *r, const float *w, int x, int y, int z,
+                                       RayEvent enter, RayEvent exit, uint number, int precise,
+                                       CellChange *change) {
+  CellPoint a, b;
+  int found;
+  if (!corners_differ(w)) return 0;
+  a = event_position(r, enter, x, y, z, 0);
+  b = event_position(r, exit, x, y, z, 1);
+  change->cubic = segment_cubic(w, a, b);
+  found = isolate_bernstein_change(change->cubic, number, &change->bracket);
+  if (found != ISO_DOUBTFUL || !precise) return found;
+  return isolate_change_precisely(precise_segment_cubic(w, a, b), change->cubic, number,
+                                  &change->bracket);
+}
+
 /// 0 without its sign, which compilers may change by rewriting differences (llvmpipe's does).
 ISO_INLINE float without_zero_sign(float x) {
   return x == 0.0f ? 0.0f : x;

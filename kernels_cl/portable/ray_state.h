@@ -28,6 +28,7 @@ ISO_NAMESPACE_BEGIN
 #define ISO_SIDE_OUTSIDE 1u
 #define ISO_SIDE_INSIDE 2u
 #define ISO_SIDE_NOT_CERTAIN 3u  ///< besides: it has not been found out
+#define ISO_AT_HIT 3u            ///< instead of a side: the ray stands at its last hit
 
 // What a launch of march_packets begins with, if not with a list of rays.
 #define ISO_BEGINS_FRAME 1u  ///< with the rays of the picture
@@ -43,7 +44,8 @@ typedef struct RayEntry {
 /// The place where a ray stands, and goes on from.
 typedef struct RayStand {
   uint block_id;
-  uint side;  ///< if it stands behind a border of levels of detail, where it was before: ISO_SIDE_*
+  uint side;  ///< if it stands behind a border of levels of detail, where it was before:
+              ///< ISO_SIDE_*; or ISO_AT_HIT
 } RayStand;
 
 ISO_INLINE uint pack_entry(uint pixel, uint log_ahead, uint in_doubt) {

@@ -2,6 +2,9 @@
 /// Blinn-Phong, and a light above it; both sides of the surface alike. Portable: OpenCL C 1.2 and
 /// C++, so that pictures of devices and of the twin are the same files. No pow.
 ///
+/// Instead of the light above, there may be a light of the scene, which does not turn. It lights
+/// the sides that face it, as far as these see it (ambient.h).
+///
 /// The light above turns with the camera, for which way is up in a scan is not known: it stands
 /// halfway between the viewer and the picture's upper edge. It tells slopes that face up from those
 /// that face down, which the headlight lights alike.
@@ -18,13 +21,25 @@ typedef struct ShadeParams {
       normal[9];  ///< row-major: gradient in index space -> normal in world space (up to a factor)
   float view[9];  ///< row-major: ray direction in index space -> world space (up to a factor)
   float surface_r, surface_g, surface_b;
-  float background_r, background_g, background_b;  ///< 0 if transparent
-  float ambient;                                   ///< weight of light from all around
-  float diffuse, specular;                         ///< of the headlight; its highlight is white
-  float above;                                     ///< weight of the light above
-  uint transparent;  ///< 0 or 1: pictures have an alpha, and no background
+  float background_r, background_g, background_b;  ///< at the lower edge; 0 if transparent
+  float rise_r, rise_g, rise_b;  ///< of the background to the upper edge; 0: it is uniform
+  float ambient;                 ///< weight of light from all around
+  float diffuse, specular;       ///< of the headlight; its highlight is white
+  float above;                   ///< weight of the light above, or the scene's
+  uint transparent;              ///< 0 or 1: pictures have an alpha, and no background
+  uint has_map;                  ///< 0, ISO_MAP_BY_*: surfaces have the colour map's colours
+  /// Place in the colour map, [0,1], of what lies at p in index space: axis p + axis_begin.
+  float axis[3], axis_begin;
+  uint has_light;  ///< 0 or 1: there is a light of the scene, instead of the light above
+  float light[3];  ///< towards it, in world space, of length 1
+  float field_low, field_scale;  ///< place of a field's value: (value - field_low) * field_scale
 } ShadeParams;
-ISO_CHECK_SIZE(ShadeParams, 116);
+ISO_CHECK_SIZE(ShadeParams, 172);
+
+#define ISO_MAP_BY_AXIS 1u
+#define ISO_MAP_BY_FIELD 2u
+
+#define ISO_MAP_COLORS 256u  ///< of a colour map: words, red in bits 0..7, green 8..15, blue 16..23
 
 /// Bytes of a pixel: RGB, or RGBA.
 ISO_INLINE uint num_channels(const ShadeParams *p) {
@@ -59,21 +74,61 @@ ISO_INLINE uint pixel_of(float r, float g, float b, uint alpha) {
   return to_byte(r) | to_byte(g) << 8 | to_byte(b) << 16 | alpha << 24;
 }
 
-/// A pixel whose rays hit nothing.
-ISO_INLINE uint background_pixel(const ShadeParams *p) {
-  const Color color = make_color(p->background_r, p->background_g, p->background_b);
-  return pixel_of(color.r, color.g, color.b, 0);
+/// The background at the middle of a row of pixels, row 0 at the top. All rays of a pixel have the
+/// same.
+///
+/// height  of the picture [rays]
+ISO_INLINE Color background_color(const ShadeParams *p, uint row, uint height, uint samples) {
+  float up = 0.0f;
+  if (p->rise_r != 0.0f || p->rise_g != 0.0f || p->rise_b != 0.0f) {
+    const uint rows = height / samples;
+    up = ((float)(rows - row) - 0.5f) / (float)rows;
+  }
+  return make_color(fma(up, p->rise_r, p->background_r), fma(up, p->rise_g, p->background_g),
+                    fma(up, p->rise_b, p->background_b));
 }
 
-/// The color of a ray. open: the share of the sky that its hit sees, [0,1]; the same share of all
-/// lights but the headlight's gets there.
-ISO_INLINE Color shade_ray(const FrameParams *frame, const ShadeParams *p, uint ray_id, float t,
-                           float gx, float gy, float gz, float open) {
+/// The colour of a map [ISO_MAP_COLORS] at a place: 0 is its first colour, 1 its last.
+ISO_INLINE Color map_color(ISO_GLOBAL const uint *color_map, float at) {
+  uint word;
+  at = at > 0.0f ? (at < 1.0f ? at : 1.0f) : 0.0f; /* 0 also if it is not a number */
+  word = color_map[(uint)fma(at, (float)(ISO_MAP_COLORS - 1u), 0.5f)];
+  return make_color((float)(word & 255u) / 255.0f, (float)(word >> 8 & 255u) / 255.0f,
+                    (float)(word >> 16 & 255u) / 255.0f);
+}
+
+/// The colour of the surface that a ray hits at t: its own, or the colour map's.
+///
+/// color_map  [ISO_MAP_COLORS]; not read without one
+/// value      of the field at the hit; NaN: there is none, and the surface has its own colour
+ISO_INLINE Color surface_color(const FrameParams *frame, const ShadeParams *p,
+                               ISO_GLOBAL const uint *color_map, uint ray_id, float t, float value,
+                               Color own) {
+  Ray ray;
+  float along, at;
+  if (!p->has_map) return own;
+  if (p->has_map == ISO_MAP_BY_FIELD) {
+    if (value != value) return own;
+    at = (value - p->field_low) * p->field_scale;
+  } else {
+    ray = make_ray(frame, ray_id);
+    along = t / frame->view.t_scale;
+    at = fma(p->axis[0], fma(along, ray.x.d, ray.x.o),
+             fma(p->axis[1], fma(along, ray.y.d, ray.y.o),
+                 fma(p->axis[2], fma(along, ray.z.d, ray.z.o), p->axis_begin)));
+  }
+  return map_color(color_map, at);
+}
+
+/// The colour of a ray that hits a surface of that colour. open: the share of the sky that
+/// the hit sees, [0,1]; the same share of all lights but the headlight and the scene's gets there.
+/// lit: the share of the scene's light that gets there.
+ISO_INLINE Color shade_ray(const FrameParams *frame, const ShadeParams *p, Color surface,
+                           uint ray_id, float gx, float gy, float gz, float open, float lit) {
   Ray ray;
   float nx, ny, nz, vx, vy, vz, ux, uy, uz, n, lengths, cosine, facing, slope, highlight, light;
   float largest = fabs(gx) > fabs(gy) ? fabs(gx) : fabs(gy);
   int i;
-  if (t == INFINITY) return make_color(p->background_r, p->background_g, p->background_b);
   ray = make_ray(frame, ray_id);
   largest = fabs(gz) > largest ? fabs(gz) : largest;
   if (largest >
@@ -100,17 +155,22 @@ ISO_INLINE Color shade_ray(const FrameParams *frame, const ShadeParams *p, uint 
    * terms. */
   facing = lengths > 0.0f ? -fma(nx, vx, fma(ny, vy, nz * vz)) / lengths : 1.0f;
   cosine = fabs(facing);
+  if (p->has_light) {
+    ux = p->light[0];
+    uy = p->light[1];
+    uz = p->light[2];
+  }
   lengths = n * sqrt(fma(ux, ux, fma(uy, uy, uz * uz)));
   slope = lengths > 0.0f ? fma(nx, ux, fma(ny, uy, nz * uz)) / lengths : 0.0f;
   facing /= cosine > ISO_GRAZING ? cosine : ISO_GRAZING; /* the side that is seen, 1 or -1 */
-  slope = fma(slope, facing, cosine) * 0.70710678f;
+  slope = p->has_light ? slope * facing : fma(slope, facing, cosine) * 0.70710678f;
   highlight = cosine;
   for (i = 0; i < 5; ++i) highlight *= highlight; /* cosine^32 */
   light = fma(p->diffuse, cosine, open * p->ambient);
-  if (slope > 0.0f) light = fma(open * p->above, slope, light);
+  if (slope > 0.0f) light = fma((p->has_light ? lit : open) * p->above, slope, light);
   highlight *= p->specular;
-  return make_color(fma(p->surface_r, light, highlight), fma(p->surface_g, light, highlight),
-                    fma(p->surface_b, light, highlight));
+  return make_color(fma(surface.r, light, highlight), fma(surface.g, light, highlight),
+                    fma(surface.b, light, highlight));
 }
 
 /// RGBA of the pixel at a column and row of the picture, 8 bits each, red in bits 0..7. The pixel
@@ -118,26 +178,41 @@ ISO_INLINE Color shade_ray(const FrameParams *frame, const ShadeParams *p, uint 
 /// of the rays that hit, and A is their share of all rays (straight alpha); 0 0 0 0 if none hits.
 /// Otherwise the colour is the mean of all rays, and A is 255 if any of them hits, else 0.
 ///
-/// open_counts  [ray] ambient rays of its hit that met nothing (ambient.h)
+/// color_map    as surface_color()
+/// open_counts  [2][ray] ambient rays of its hit, and shadow rays, that met nothing (ambient.h)
 /// num_ambient  ambient rays of a hit; 0: there are none, and all is open
-ISO_INLINE uint shade_pixel(const FrameParams *frame, const ShadeParams *p, uint samples,
-                            uint column, uint row, ISO_GLOBAL const HitRecord *hits,
-                            ISO_GLOBAL const uchar *open_counts, uint num_ambient) {
-  const uint num_rays = samples * samples;
+/// num_shadow   shadow rays of a hit; 0: there are none, and all is lit
+/// values       [ray] of the field; not read unless colours are by it
+ISO_INLINE uint shade_pixel(const FrameParams *frame, const ShadeParams *p,
+                            ISO_GLOBAL const uint *color_map, uint samples, uint column, uint row,
+                            ISO_GLOBAL const HitRecord *hits, ISO_GLOBAL const uchar *open_counts,
+                            uint num_ambient, uint num_shadow, ISO_GLOBAL const float *values) {
+  const uint num_rays = samples * samples, frame_rays = frame->view.width * frame->view.height;
   const uint first_ray = row * samples * frame->view.width + column * samples;
   float r = 0.0f, g = 0.0f, b = 0.0f, share;
   uint i, num_hits = 0;
-  if (samples == 1 && hits[first_ray].t == INFINITY) return background_pixel(p);
+  const Color behind = background_color(p, row, frame->view.height, samples);
+  Color own;
+  own.r = p->surface_r;
+  own.g = p->surface_g;
+  own.b = p->surface_b;
+  if (samples == 1 && hits[first_ray].t == INFINITY)
+    return pixel_of(behind.r, behind.g, behind.b, 0);
   for (i = 0; i < num_rays; ++i) { /* in one order on every device */
     const uint ray_id = first_ray + i / samples * frame->view.width + i % samples;
-    const Color color =
-        shade_ray(frame, p, ray_id, hits[ray_id].t, hits[ray_id].grad_x, hits[ray_id].grad_y,
-                  hits[ray_id].grad_z,
-                  num_ambient == 0 ? 1.0f : (float)open_counts[ray_id] / (float)num_ambient);
+    Color color = behind;
+    if (hits[ray_id].t != INFINITY) {
+      const float value = p->has_map == ISO_MAP_BY_FIELD ? values[ray_id] : 0.0f;
+      color = shade_ray(
+          frame, p, surface_color(frame, p, color_map, ray_id, hits[ray_id].t, value, own), ray_id,
+          hits[ray_id].grad_x, hits[ray_id].grad_y, hits[ray_id].grad_z,
+          num_ambient == 0 ? 1.0f : (float)open_counts[ray_id] / (float)num_ambient,
+          num_shadow == 0 ? 1.0f : (float)open_counts[frame_rays + ray_id] / (float)num_shadow);
+      ++num_hits;
+    }
     r += color.r;
     g += color.g;
     b += color.b;
-    if (hits[ray_id].t != INFINITY) ++num_hits;
   }
   if (p->transparent) {
     if (num_hits == 0) return 0;

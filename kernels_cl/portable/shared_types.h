@@ -99,6 +99,10 @@ inline uint popcount(uint x) {
   0 /* 1: rays are read from a list (GivenRay) instead of made from the camera; each stays in one \
        level of detail */
 #endif
+
+#ifndef ISO_BEHIND_HITS   /* by -D */
+#define ISO_BEHIND_HITS 0 /* 1: rays of the camera go on behind hits that they have (layers.h) */
+#endif
 #define ISO_BANDS (ISO_LEVELS && !ISO_GIVEN_RAYS) /* rays go from level to level */
 
 #ifndef ISO_CLIP /* by -D */
@@ -248,12 +252,19 @@ typedef struct BlockRays {
 ISO_CHECK_SIZE(BlockRays, 8);
 
 #define ISO_CAP 64u  ///< added to HitRecord::cell of a hit on a clipping plane
+/// HitRecord::cell has the number of the crossing in its cell from this bit on: 0..2. Only rays
+/// that have gone on from a hit (layers.h) have others than the first.
+#define ISO_CROSSING_BIT 7
+#define ISO_SURFACE_BIT 9   ///< and the number of the surface from this one on
+#define ISO_MAX_SURFACES 8  ///< of a frame
+#define ISO_MAX_LAYERS 16   ///< hits of a ray that are drawn
 
 /// One pixel's hit (design: a hit is cell + local position; t is derived from it).
 typedef struct HitRecord {
   float t;        ///< distance from the eye [world units]; INFINITY: no hit
   uint block_id;  ///< bx + blocks_x * (by + blocks_y * bz); of several levels, see LevelPlace
-  uint cell;      ///< x + 4 y + 16 z in the block; of a cap, ISO_CAP more
+  uint cell;      ///< x + 4 y + 16 z in the block, bits 0..5; above: ISO_CAP, ISO_CROSSING_BIT,
+                  ///< ISO_SURFACE_BIT
   float x, y, z;  ///< position in the dual cell, [0,1]^3
   float grad_x, grad_y,
       grad_z;  ///< gradient there, see smooth_gradient.h [value per voxel], index space; of a cap,

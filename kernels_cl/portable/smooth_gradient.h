@@ -48,7 +48,7 @@ ISO_INLINE Stencil stencil_of(BlockCoords b, uint cell, LastPlanes last) {
   Stencil s;
   s.x = stencil_axis((int)(4 * b.x + (cell & 3)), last.x);
   s.y = stencil_axis((int)(4 * b.y + (cell >> 2 & 3)), last.y);
-  s.z = stencil_axis((int)(4 * b.z + (cell >> 4)), last.z);
+  s.z = stencil_axis((int)(4 * b.z + (cell >> 4 & 3)), last.z);
   return s;
 }
 

@@ -97,6 +97,43 @@ ISO_INLINE int isolate_bernstein(Cubic c, Bracket *bracket) {
   return 1;
 }
 
+/// The piece of [0,1] with change number `number` of inside, 0: the first. Returns as
+/// isolate_bernstein(), whose answers for number 0 are the same.
+///
+/// Changes lie in different pieces between 0, the extrema and 1, so a ray that goes on from one of
+/// them finds the next, whatever rounding does to their places.
+ISO_INLINE int isolate_bernstein_change(Cubic c, uint number, Bracket *bracket) {
+  const int in0 = c.b0 >= 0.0f, in1 = c.b1 >= 0.0f, in2 = c.b2 >= 0.0f, in3 = c.b3 >= 0.0f;
+  Extrema at;
+  float noise;
+  int inside = in0, i;
+  if (number == 0) return isolate_bernstein(c, bracket);
+  if (in0 != in3 && !(in1 != in0 && in2 == in0)) return 0;
+  if (in0 == in1 && in0 == in2 && in0 == in3) return 0;
+  at = cubic_extrema(c.b1 - c.b0, c.b2 - c.b1, c.b3 - c.b2);
+  noise = ISO_CUBIC_NOISE * largest_coefficient(c);
+  bracket->lo = 0.0f;
+  if (fabs(at.discriminant) <= ISO_CUBIC_NOISE) return ISO_DOUBTFUL;
+  for (i = 0; i < 3; ++i) {
+    const float s = i == 0 ? at.first : (i == 1 ? at.second : 1.0f);
+    float value, derivative;
+    int now = in3;
+    if (s < 0.0f) continue;
+    if (i < 2) {
+      value = cubic_value(c, s, &derivative);
+      if (fabs(value) <= noise) return ISO_DOUBTFUL;
+      now = value >= 0.0f;
+    }
+    if (now != inside && number-- == 0) {
+      bracket->hi = s;
+      return 1;
+    }
+    inside = now;
+    bracket->lo = s;
+  }
+  return 0;
+}
+
 /// The same in 48 bits, for the few segments on which isolate_bernstein() is in doubt, and the root
 /// itself (lo == hi) by bisection. rounded: the float coefficients, whose end signs neighbouring
 /// cells share and which therefore say what is inside at entry and exit.
@@ -115,6 +152,39 @@ ISO_INLINE int isolate_precisely(PreciseCubic c, Cubic rounded, Bracket *bracket
     } else {
       hi = s;
       changed = 1;
+    }
+  }
+  bracket->lo = bracket->hi = hi;
+  return 1;
+}
+
+/// isolate_precisely() for change number `number`, 0: the first.
+ISO_INLINE int isolate_change_precisely(PreciseCubic c, Cubic rounded, uint number,
+                                        Bracket *bracket) {
+  const Extrema at = cubic_extrema(tf_sub(c.b[1], c.b[0]).hi, tf_sub(c.b[2], c.b[1]).hi,
+                                   tf_sub(c.b[3], c.b[2]).hi);
+  int inside = rounded.b0 >= 0.0f, changed = 0, i;
+  float lo = 0.0f, hi = 1.0f;
+  for (i = 0; i < 3 && !changed; ++i) {
+    const float s = i == 0 ? at.first : (i == 1 ? at.second : 1.0f);
+    int now;
+    if (s < 0.0f) continue;
+    now = i < 2 ? precise_cubic_inside(c, s) : rounded.b3 >= 0.0f;
+    if (now != inside && number-- == 0) {
+      hi = s;
+      changed = 1;
+    } else {
+      lo = s;
+      inside = now;
+    }
+  }
+  if (!changed) return 0;
+  for (i = 0; i < 24; ++i) {
+    const float s = 0.5f * (lo + hi);
+    if (precise_cubic_inside(c, s) == inside) {
+      lo = s;
+    } else {
+      hi = s;
     }
   }
   bracket->lo = bracket->hi = hi;

@@ -10,6 +10,7 @@
 #include <cstring>
 #include <fstream>
 #include <iterator>
+#include <optional>
 #include <system_error>
 #include <vector>
 
@@ -57,11 +58,15 @@ void read_some(VolumeReader &reader, std::uint32_t z, std::uint32_t num_layers,
                          [](double value) { return static_cast<float>(value); });
 }
 
-/// All voxels, at most so many layers in each call; empty if the volume is refused.
+/// All voxels of a volume, or of a series' last step; empty if it is refused.
+///
+/// voxels_at_once  read by each call, at most, but whole layers
 std::vector<float> read_voxels(const fs::path &path, std::uint64_t voxels_at_once) {
   std::vector<float> voxels;
   const bool whole = accepts([&] {
-    const std::unique_ptr<VolumeReader> reader = open_volume(path);
+    std::optional<std::uint32_t> step = num_steps(path);
+    if (step) step = *step - 1;
+    const std::unique_ptr<VolumeReader> reader = open_volume(path, {}, step);
     const VolumeInfo info = reader->info();
     check_volume_info(info, path.string());
     const std::uint64_t layer = std::uint64_t(info.dims.x) * info.dims.y;

@@ -60,4 +60,36 @@ nlohmann::ordered_json clip_accuracy_json(const ClipAccuracy &tally) {
           {"undecided", tally.undecided}};
 }
 
+void print_layer_accuracy_header(std::string_view what) {
+  fmt::print(
+      "{:<28} {:>9} {:>9} {:>9} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>9}\n",
+      what, "rays", "hits", "caps", "most hits", "missed", "false", "order", "surface", "side",
+      "kind", "place", "gradient", "undecided");
+}
+
+void print_layer_accuracy(std::string_view name, const LayerAccuracy &tally) {
+  fmt::print(
+      "{:<28} {:>9} {:>9} {:>9} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>9}\n",
+      name, tally.rays, tally.hits, tally.caps, tally.most_hits, tally.missed, tally.false_hits,
+      tally.wrong_order, tally.wrong_surfaces, tally.wrong_sides, tally.wrong_kinds,
+      tally.wrong_places, tally.wrong_gradients, tally.undecided);
+}
+
+nlohmann::ordered_json layer_accuracy_json(const LayerAccuracy &tally) {
+  return {{"rays", tally.rays},
+          {"hits", tally.hits},
+          {"caps", tally.caps},
+          {"most_hits", tally.most_hits},
+          {"missed", tally.missed},
+          {"false", tally.false_hits},
+          {"wrong_order", tally.wrong_order},
+          {"wrong_surfaces", tally.wrong_surfaces},
+          {"wrong_sides", tally.wrong_sides},
+          {"wrong_kinds", tally.wrong_kinds},
+          {"wrong_places", tally.wrong_places},
+          {"wrong_gradients", tally.wrong_gradients},
+          {"undecided", tally.undecided},
+          {"cut", tally.cut}};
+}
+
 }  // namespace isowave::core::tools

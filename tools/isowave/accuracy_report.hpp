@@ -6,6 +6,7 @@
 
 #include "reference/accuracy.hpp"
 #include "reference/clip_oracle.hpp"
+#include "reference/layer_oracle.hpp"
 
 namespace isowave::core::tools {
 
@@ -18,5 +19,10 @@ nlohmann::ordered_json accuracy_json(const Accuracy &tally);
 void print_clip_accuracy_header(std::string_view what);
 void print_clip_accuracy(std::string_view name, const ClipAccuracy &tally);
 nlohmann::ordered_json clip_accuracy_json(const ClipAccuracy &tally);
+
+// The same of frames with several and translucent surfaces.
+void print_layer_accuracy_header(std::string_view what);
+void print_layer_accuracy(std::string_view name, const LayerAccuracy &tally);
+nlohmann::ordered_json layer_accuracy_json(const LayerAccuracy &tally);
 
 }  // namespace isowave::core::tools

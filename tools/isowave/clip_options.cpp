@@ -1,5 +1,7 @@
 #include "tools/isowave/clip_options.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <glm/glm.hpp>
 #include <limits>
@@ -18,28 +20,12 @@ namespace {
 /// number.
 std::vector<std::optional<double>> parse_list(const char *option, std::string_view text) {
   std::vector<std::optional<double>> numbers;
-  for (std::size_t begin = 0, end = 0; end != text.npos; begin = end + 1) {
-    end = text.find(',', begin);
-    const std::string_view field = text.substr(begin, end - begin);
+  for (const std::string_view field : split_at_commas(text)) {
     numbers.push_back(parse_finite(field));
     if (!field.empty() && !numbers.back())
       throw Error("{} {}: '{}' is no finite number", option, text, field);
   }
   return numbers;
-}
-
-ClipPlane parse_plane(const std::string &text, const VolumeInfo &info) {
-  const std::vector<std::optional<double>> numbers = parse_list("--clip", text);
-  if (numbers.size() < 3 || numbers.size() > 4 || !numbers[0] || !numbers[1] || !numbers[2] ||
-      !numbers.back())
-    throw Error("--clip {}: give NX,NY,NZ or NX,NY,NZ,D", text);
-  const glm::dvec3 normal(*numbers[0], *numbers[1], *numbers[2]);
-  check_clip({.planes = {{normal, 0}}});
-  const glm::dvec3 direction = glm::normalize(normal);
-  if (numbers.size() == 4) return {direction, *numbers[3]};
-  const glm::dvec3 middle =
-      info.origin + info.index_to_world() * (0.5 * (glm::dvec3(info.dims) - 1.0));
-  return {direction, glm::dot(direction, middle)};
 }
 
 std::vector<ClipPlane> parse_box(const std::string &text) {
@@ -62,9 +48,28 @@ std::vector<ClipPlane> parse_box(const std::string &text) {
 
 }  // namespace
 
+ClipPlane parse_plane(const char *option, const std::string &text, const VolumeInfo &info) {
+  std::string list = text;
+  const std::size_t axis = std::string_view("xyz").find(text.substr(0, text.find(',')));
+  if (axis != std::string_view::npos && text.find(',') != 0)
+    list.replace(0, 1, axis == 0 ? "1,0,0" : axis == 1 ? "0,1,0" : "0,0,1");
+  const std::vector<std::optional<double>> numbers = parse_list(option, list);
+  if (numbers.size() < 3 || numbers.size() > 4 || !numbers[0] || !numbers[1] || !numbers[2] ||
+      !numbers.back())
+    throw Error("{} {}: give NX,NY,NZ or NX,NY,NZ,D", option, text);
+  const glm::dvec3 normal(*numbers[0], *numbers[1], *numbers[2]);
+  check_plane({normal, 0}, fmt::format("{} {}: the plane", option, text));
+  const glm::dvec3 direction = glm::normalize(normal);
+  if (numbers.size() == 4) return {direction, *numbers[3]};
+  const glm::dvec3 middle =
+      info.origin + info.index_to_world() * (0.5 * (glm::dvec3(info.dims) - 1.0));
+  return {direction, glm::dot(direction, middle)};
+}
+
 Clip read_clip(const ClipOptions &options, const VolumeInfo &info) {
   Clip clip{.caps = !options.no_caps};
-  for (const std::string &text : options.planes) clip.planes.push_back(parse_plane(text, info));
+  for (const std::string &text : options.planes)
+    clip.planes.push_back(parse_plane("--clip", text, info));
   if (!options.box.empty()) {
     const std::vector<ClipPlane> sides = parse_box(options.box);
     clip.planes.insert(clip.planes.end(), sides.begin(), sides.end());
@@ -78,11 +83,12 @@ Clip read_clip(const ClipOptions &options, const VolumeInfo &info) {
 void add_clip_options(CLI::App &command, ClipOptions &options) {
   command
       .add_option("--clip", options.planes,
-                  "clipping plane: draws what lies in front of it, towards the direction NX,NY,NZ. "
-                  "D: the plane's distance from the world's origin along that direction [world "
+                  "clipping plane: draws what lies in front of it, towards an axis or the "
+                  "direction NX,NY,NZ. D: the plane's distance from the world's origin along that "
+                  "direction [world "
                   "units]; without D, it goes through the middle of the volume; repeat it for more "
                   "planes")
-      ->type_name("NX,NY,NZ[,D]")
+      ->type_name("x|y|z|NX,NY,NZ[,D]")
       ->allow_extra_args(false);
   command
       .add_option("--clip-box", options.box,

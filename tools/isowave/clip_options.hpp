@@ -19,6 +19,12 @@ struct ClipOptions {
 
 void add_clip_options(CLI::App &command, ClipOptions &options);
 
+/// The plane of NX,NY,NZ[,D], or of an axis x, y or z and [,D]. Its normal has length 1.
+///
+/// info    a plane without a distance goes through the middle of this volume
+/// Throws  Error in one line, which names the option
+ClipPlane parse_plane(const char *option, const std::string &text, const VolumeInfo &info);
+
 /// Normals have length 1.
 ///
 /// info    planes without a distance go through the middle of this volume

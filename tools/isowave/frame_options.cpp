@@ -59,9 +59,10 @@ std::vector<Camera> make_cameras(const std::string &path, const VolumeInfo &info
   return file ? file->cameras : orbit_cameras(info, views.count);
 }
 
-Scene load_scene(const std::string &path, const VolumeOptions &volume, const FrameOptions &options,
-                 const Views &views, ocl::Device *device) {
-  Scene scene;
+VolumeAndViews load_volume_and_views(const std::string &path, const VolumeOptions &volume,
+                                     const FrameOptions &options, const Views &views,
+                                     ocl::Device *device) {
+  VolumeAndViews scene;
   scene.size = views.size;
   scene.volume = load_volume(path, to_overrides(volume), options.compression, device);
   scene.cameras = make_cameras(path, scene.volume.info, options, views);
@@ -85,7 +86,7 @@ CLI::Option *add_frame_options(CLI::App &command, FrameOptions &options) {
   command.add_option("--size", options.size, "picture size WxH [1280x720, or the camera file's]");
   CLI::Option *orbit =
       command.add_option("--orbit", options.orbit, "draw N views around the volume [1]")
-          ->check(CLI::Range(1u, 100000u));
+          ->check(CLI::Range(1u, kMostViews));
   command.add_option("--cameras", options.cameras, "camera file (JSON)")->excludes(orbit);
   return isovalue;
 }

@@ -14,7 +14,7 @@
 
 namespace isowave::core::tools {
 
-/// Options as typed; read_views() and load_scene() check them.
+/// Options as typed; read_views() and load_volume_and_views() check them.
 struct FrameOptions {
   CompressionOptions compression;  ///< of a volume that is not
   std::vector<double> isovalues;
@@ -44,7 +44,7 @@ struct Views {
 Views read_views(const FrameOptions &options);
 
 /// The volume and the views of it.
-struct Scene {
+struct VolumeAndViews {
   CompressedVolume volume;
   std::vector<Camera> cameras;
   ImageSize size;
@@ -57,7 +57,8 @@ std::vector<Camera> make_cameras(const std::string &path, const VolumeInfo &info
 
 /// Reads or compresses the volume and makes its cameras. Throws Error in one line, also when a
 /// camera file is for another volume. Where a device is given, it compresses the volume.
-Scene load_scene(const std::string &path, const VolumeOptions &volume, const FrameOptions &options,
-                 const Views &views, ocl::Device *device = nullptr);
+VolumeAndViews load_volume_and_views(const std::string &path, const VolumeOptions &volume,
+                                     const FrameOptions &options, const Views &views,
+                                     ocl::Device *device = nullptr);
 
 }  // namespace isowave::core::tools

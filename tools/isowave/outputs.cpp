@@ -49,7 +49,7 @@ void Outputs::read(const fs::path &path) {
 }
 
 void Outputs::read_volume(const std::string &path) {
-  if (path.starts_with("generate:")) return;
+  if (path.starts_with(kGenerate)) return;
   std::error_code failure;
   if (!fs::exists(path, failure)) return;
   read(path);

@@ -1,7 +1,6 @@
 // isowave render: pictures, depth and statistics of isosurfaces, on an OpenCL device, on the host,
 // on the devices of several processes, or by the scalar twin. The library's isowave::Renderer draws
-// them; this file makes the renderer that a command line asks for, and reports more than users of
-// the library see.
+// them; this file reports more than users of the library see.
 
 #include <fmt/format.h>
 
@@ -12,7 +11,6 @@
 #include <optional>
 #include <utility>
 
-#include "core/api/choices.hpp"
 #include "core/api/convert.hpp"
 #include "core/api/device_renderer.hpp"
 #include "core/api/frame_parts.hpp"
@@ -23,20 +21,20 @@
 #include "core/bricks/brick_volume.hpp"
 #include "core/bricks/ranks.hpp"
 #include "core/bricks/team_renderer.hpp"
-#include "core/host/host_renderer.hpp"
 #include "core/io/file_name.hpp"
+#include "core/io/movie.hpp"
 #include "core/io/npy.hpp"
 #include "core/io/png.hpp"
 #include "core/render/device_renderer.hpp"
-#include "core/stages/march_packets.hpp"
 #include "core/zfp/isovalue.hpp"
-#include "reference/twin_renderer.hpp"
 #include "tools/isowave/commands.hpp"
 #include "tools/isowave/compile_report.hpp"
 #include "tools/isowave/mpi_team.hpp"
 #include "tools/isowave/program.hpp"
+#include "tools/isowave/render_drawing.hpp"
 #include "tools/isowave/render_options.hpp"
 #include "tools/isowave/render_report.hpp"
+#include "tools/isowave/render_series.hpp"
 #include "tools/isowave/render_stats.hpp"
 
 namespace isowave::core::tools {
@@ -46,156 +44,20 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
-/// The renderer of a command line, and what it needs, in the order in which it is made.
-struct Drawing {
-  explicit Drawing(Team &of) : team(of) {}
-
-  Team &team;
-  Views views{};
-  std::vector<Camera> cameras{};
-  isowave::Appearance appearance{};
-  std::unique_ptr<ocl::Device> device{};  ///< none with --reference, and on the host
-  std::optional<TeamVolume> bricks{};     ///< of several processes
-  CompressedVolume whole{};               ///< of one process
-  std::unique_ptr<isowave::Renderer::Implementation> renderer{};
-  TeamRenderer *of_team = nullptr;                ///< in the renderer, if several processes draw
-  const DeviceRenderer *on_device = nullptr;      ///< this process's, if a device draws
-  ocl::DrawsOn draws_on = ocl::DrawsOn::kDevice;  ///< not with --reference
-
-  bool is_team() const { return team.size() > 1; }
-  bool on_host() const { return draws_on != ocl::DrawsOn::kDevice; }
-  const CompressedVolume &volume() const { return bricks ? bricks->brick : whole; }
-  const VolumeInfo &info() const { return bricks ? bricks->whole() : whole.info; }
-};
-
-std::unique_ptr<ocl::Device> open_device(const RenderArgs &options, bool is_team) {
-  const ocl::DeviceInfo info = is_team ? choose_local_device(options.device, MpiJob::local_rank())
-                                       : ocl::choose_device(options.device);
-  fmt::print("device {}: {} ({}); choose another with --device or ISOWAVE_DEVICE\n", info.index,
-             info.name, info.platform);
-  return std::make_unique<ocl::Device>(info, !options.stats.empty() && !options.no_stage_times);
-}
-
-/// The options that the renderer must be made with, for any volume.
-void set_wanted(RenderArgs &options) {
-  RendererOptions &wanted = options.renderer_flags.values;
-  wanted.with_shading = asks_for_picture(options);
-  wanted.with_kept_picture = options.time_budget.has_value();
-  wanted.with_given_rays = options.ambient_rays != 0;
-  wanted.with_bounds = draws_bounds(options);
-  options.frame.compression.measure_error |= wanted.with_bounds;
-  if (!wanted.with_shading) options.normals = to_string(Normals::kCell);  // no picture shows them
-}
-
-/// Chooses between the host and devices.
-void choose_drawing(const CLI::App &command, const RenderArgs &options, Drawing &drawing) {
-  if (options.reference || drawing.is_team()) return;
-  drawing.draws_on = ocl::choose_drawing(options.device);
-  const std::string option = find_device_option(command);
-  if (option.empty() || !drawing.on_host()) return;
-  if (drawing.draws_on == ocl::DrawsOn::kHost)
-    throw Error("{}: the host has no such option: leave it out, or name a device", option);
-  if (ocl::list_devices().empty())
-    throw Error("{}: it needs an OpenCL device, and there is none: leave it out", option);
-  drawing.draws_on = ocl::DrawsOn::kDevice;
-}
-
-/// Whether a device must draw instead of the host, whose memory is not enough for the volume.
-bool exceeds_host(const RenderArgs &options, const Drawing &drawing) {
-  return drawing.draws_on == ocl::DrawsOn::kHostByDefault &&
-         !HostRenderer::fits(drawing.whole, options.renderer_flags.values.memory_budget) &&
-         !ocl::list_devices().empty();
-}
-
-/// Whether levels of detail are chosen among those that the volume has. Small pictures of a time
-/// budget keep the finest level on CPUs: Abilities::levels_pay.
-bool chooses_levels(const RenderArgs &options, const Drawing &drawing) {
-  return options.max_surface_error ||
-         (options.time_budget && drawing.device && options.renderer_flags.pipeline != "blocks" &&
-          !MarchPackets::suits(drawing.device->info()));
-}
-
-void load_alone(RenderArgs &options, Drawing &drawing) {
-  if (options.voxel_pixels > 0 || chooses_levels(options, drawing))
-    want_levels(options.frame.compression);
-  Scene scene =
-      load_scene(options.input, options.volume, options.frame, drawing.views, drawing.device.get());
-  print_compression(options.input, scene.volume);
-  options.renderer_flags.values.with_levels =
-      chooses_levels(options, drawing) && !scene.volume.coarser_levels.empty();
-  drawing.whole = std::move(scene.volume);
-  drawing.cameras = std::move(scene.cameras);
-  if (exceeds_host(options, drawing)) {
-    drawing.draws_on = ocl::DrawsOn::kDevice;
-    drawing.device = open_device(options, false);
-  } else if (drawing.on_host()) {
-    fmt::print("host: {} threads; choose a device with --device or ISOWAVE_DEVICE\n",
-               thread_count(0));
-  }
-}
-
-void load_bricks(const RenderArgs &options, Drawing &drawing) {
-  TeamVolumeSource source;
-  source.path = options.input;
-  source.overrides = to_overrides(options.volume);
-  source.bricks = options.bricks;
-  source.isovalues.assign(options.frame.isovalues.begin(), options.frame.isovalues.end());
-  together(drawing.team, [&] {
-    source.storage = storage_for(options.input, options.frame.compression, drawing.device.get());
-  });
-  drawing.bricks = open_together(drawing.team, source, [&](std::vector<VolumeInfo> &levels) {
-    if (!is_zfp_name(options.input)) warn_of_header(options.input, source.overrides);
-    check_brick_levels(options, levels);
-    if (options.voxel_pixels == 0 && !chooses_levels(options, drawing)) levels.resize(1);
-    drawing.cameras = make_cameras(options.input, levels.front(), options.frame, drawing.views);
-  });
-}
-
-std::unique_ptr<Renderer> make_core_renderer(RenderArgs &options, Drawing &drawing) {
-  const ImageSize size = drawing.views.size;
-  options.renderer = to_renderer_options(options.renderer_flags, size);
-  if (options.reference)
-    return std::make_unique<TwinRenderer>(drawing.whole, size, options.renderer.solver);
-  if (drawing.on_host()) {
-    return std::make_unique<HostRenderer>(
-        drawing.whole,
-        HostRendererOptions{.memory_limit = options.renderer.memory_budget, .largest = size});
-  }
-  if (!drawing.is_team()) {
-    auto renderer =
-        std::make_unique<DeviceRenderer>(*drawing.device, drawing.whole, options.renderer);
-    drawing.on_device = renderer.get();
-    return renderer;
-  }
-  auto renderer = std::make_unique<TeamRenderer>(*drawing.device, *drawing.bricks, options.renderer,
-                                                 drawing.team);
-  drawing.of_team = renderer.get();
-  drawing.on_device = &renderer->renderer();
-  return renderer;
-}
-
-void make_renderer(RenderArgs &options, Drawing &drawing) {
-  const RendererOptions &wanted = options.renderer_flags.values;
-  drawing.renderer = std::make_unique<isowave::Renderer::Implementation>(
-      std::make_shared<Turns>(), drawing.volume(),
-      add_choices(make_core_renderer(options, drawing),
-                  {.with_time_budget = wanted.with_kept_picture}, drawing.volume(),
-                  drawing.bricks ? drawing.bricks->rate : drawing.whole.rate()));
-  if (drawing.on_device != nullptr) options.renderer = drawing.on_device->options();
-}
-
 /// One frame of the command line, and where its files go.
 struct FrameOfMany {
   const RenderArgs &options;
   Drawing &drawing;
   double isovalue;
   std::size_t view;
+  std::optional<std::size_t> step;  ///< of a series
 
   fs::path path(const fs::path &name) const {
-    return frame_path(name, drawing.cameras.size(), options, isovalue, view);
+    return frame_path(name, drawing.cameras.size(), options, isovalue, view, step);
   }
   isowave::FrameRequest request() const;
-  void write_outputs(const Frame &frame) const;
+  void write_outputs(const isowave::FrameRequest &request, const Frame &frame) const;
+  Image8 annotated(const isowave::FrameRequest &request, const Frame &frame) const;
   void report_error(const Frame &frame, ordered_json &entry) const;
   void write_refined(isowave::FrameRequest request) const;
 };
@@ -211,6 +73,8 @@ isowave::FrameRequest FrameOfMany::request() const {
   isowave::FrameRequest request;
   request.camera = public_camera(drawing.cameras[view]);
   request.isovalue = isovalue;
+  request.surfaces = options.surfaces;
+  request.slices = options.slices;
   request.size = {size.width, size.height, size.samples};
   request.appearance = drawing.appearance;
   for (const ClipPlane &plane : options.clip.planes)
@@ -227,7 +91,7 @@ isowave::FrameRequest FrameOfMany::request() const {
   if (options.max_surface_error && drawing.cameras.size() > 1)
     std::ranges::transform(drawing.cameras, std::back_inserter(request.series), public_camera);
   request.time_budget_ms = options.time_budget;
-  request.want_picture = !options.image.empty();
+  request.want_picture = !options.image.empty() || !options.movie.empty();
   request.want_depth = !options.depth.empty();
   request.want_bounds = draws_bounds(options);
   if (options.progress_dir.empty()) return request;
@@ -241,11 +105,31 @@ isowave::FrameRequest FrameOfMany::request() const {
   return request;
 }
 
+/// The picture, with --annotate.
+Image8 FrameOfMany::annotated(const isowave::FrameRequest &request, const Frame &frame) const {
+  Image8 image = image_of(frame.size, frame.picture);
+  if (options.annotations) {
+    draw_annotations(image, isowave::annotation_layout(*options.annotations, request,
+                                                       frame.statistics.color_range));
+  }
+  return image;
+}
+
 /// All ranks: rank 0 writes what it has got.
-void FrameOfMany::write_outputs(const Frame &frame) const {
+void FrameOfMany::write_outputs(const isowave::FrameRequest &request, const Frame &frame) const {
   together(drawing.team, [&] {
     if (drawing.team.rank() != 0) return;
-    if (!options.image.empty()) write_png(image_of(frame.size, frame.picture), path(options.image));
+    if (!options.scene.save.empty()) {
+      isowave::Scene scene = isowave::scene_of(request);
+      scene.volume = options.input;
+      scene.field = options.color_map.field;
+      isowave::write_scene(scene, options.scene.save);
+    }
+    if (!options.image.empty() || drawing.movie) {
+      const Image8 image = annotated(request, frame);
+      if (!options.image.empty()) write_png(image, path(options.image));
+      if (drawing.movie) drawing.movie->write(image);
+    }
     if (!options.depth.empty())
       write_npy({frame.columns, frame.rows, frame.depth.to_vector()}, path(options.depth));
   });
@@ -270,8 +154,7 @@ void FrameOfMany::write_refined(isowave::FrameRequest request) const {
   request.want_depth = false;
   const Frame refined = drawing.renderer->render(request);
   together(drawing.team, [&] {
-    if (drawing.team.rank() == 0)
-      write_png(image_of(refined.size, refined.picture), path(options.refined));
+    if (drawing.team.rank() == 0) write_png(annotated(request, refined), path(options.refined));
   });
   fmt::print("  refined: {} rays hit, {:.1f} ms more\n", with_commas(refined.statistics.hits),
              refined.statistics.total_ms);
@@ -288,33 +171,66 @@ ordered_json draw_frame(const FrameOfMany &frame, ordered_json &own) {
   const double composed_before = drawing.is_team() ? drawing.of_team->composition().ms : 0;
   const isowave::FrameRequest request = frame.request();
   const Frame drawn = drawing.renderer->render(request);
-  frame.write_outputs(drawn);
+  frame.write_outputs(request, drawn);
   const std::uint64_t num_hits = drawn.statistics.hits;
   const LastFrame &last = drawing.renderer->last();
   own = frame_json(frame.isovalue, frame.view, drawing.cameras[frame.view], last.stats,
                    drawing.on_host());
+  if (frame.step) own["step"] = *frame.step;
   ordered_json entry = own;
+  const std::vector<double> isovalues =
+      options.surfaces.empty() ? std::vector{frame.isovalue} : all_isovalues(options);
+  const std::string what = fmt::format(
+      "{}isovalue{} {}, view {}", frame.step ? fmt::format("step {}, ", *frame.step) : "",
+      isovalues.size() == 1 ? "" : "s", fmt::join(isovalues, ", "), frame.view);
   if (drawing.is_team()) {
     const double ms = ms_since(begin) - last.certificate.total_ms;
-    fmt::print("isovalue {}, view {}: {} rays hit, {} bricks, {:.1f} ms\n", frame.isovalue,
-               frame.view, with_commas(num_hits), drawing.team.size(), ms);
+    fmt::print("{}: {} rays hit, {} bricks, {:.1f} ms\n", what, with_commas(num_hits),
+               drawing.team.size(), ms);
     entry = {{"isovalue", frame.isovalue},
              {"view", frame.view},
              {"rays_hit", num_hits},
              {"written_ms", ms},
              {"composition_ms", drawing.of_team->composition().ms - composed_before}};
   } else {
-    fmt::print("isovalue {}, view {}: {} rays hit, {}{:.1f} ms\n", frame.isovalue, frame.view,
-               with_commas(num_hits),
+    fmt::print("{}: {} rays hit, {}{}{:.1f} ms\n", what, with_commas(num_hits),
+               draws_layers(options) ? fmt::format("{} layers, ", last.stats.layers.layers) : "",
                drawing.on_host() ? "" : fmt::format("{} passes, ", last.stats.passes.size()),
                drawn.statistics.total_ms);
     entry["total_ms"] = drawn.statistics.total_ms;
   }
-  warn_of_isovalue(drawing.volume(), frame.isovalue);
+  if (const auto &range = drawn.statistics.field_range) {
+    fmt::print("  values of the field at the hits: {} to {}\n", (*range)[0], (*range)[1]);
+    entry["field_range"] = *range;
+  }
+  if (options.surfaces.empty()) {
+    warn_of_isovalue(drawing.volume(), frame.isovalue);
+  } else {
+    for (const double isovalue : all_isovalues(options))
+      warn_of_isovalue(drawing.volume(), isovalue);
+    for (ordered_json *json : {&own, &entry}) json->erase("isovalue");  // surfaces are options
+  }
+  if (draws_layers(options)) entry["layers"] = report_layers(last.stats.layers);
   if (options.max_surface_error) frame.report_error(drawn, entry);
   if (options.time_budget) entry["time_budget"] = report_steps(last.stats, *options.time_budget);
   if (!options.refined.empty()) frame.write_refined(request);
   return entry;
+}
+
+/// Draws all frames of a volume.
+///
+/// index               of the step that the volume is, in options.steps
+/// frames, own_frames  get the entries of all, and of this process
+void draw_step(const RenderArgs &options, Drawing &drawing, std::size_t index, ordered_json &frames,
+               ordered_json &own_frames) {
+  std::optional<std::size_t> step;
+  if (drawing.series) step = options.steps.at(index);
+  for (const double isovalue : options.frame.isovalues) {
+    for (std::size_t view = 0; view < drawing.cameras.size(); ++view) {
+      own_frames.emplace_back();
+      frames.push_back(draw_frame({options, drawing, isovalue, view, step}, own_frames.back()));
+    }
+  }
 }
 
 /// --stats of one process.
@@ -385,13 +301,6 @@ ordered_json document_of_team(const RenderArgs &options, const Drawing &drawing,
           {"ranks", ranks}};
 }
 
-void print_picture_name(const RenderArgs &options, std::size_t num_views) {
-  fmt::print("wrote {}; --output names another file\n",
-             num_frames(options, num_views) == 1
-                 ? options.image
-                 : fmt::format("{}_isoV_viewK.png", volume_stem(options.input)));
-}
-
 /// If no isovalue was given: takes a suggested one, also for the names of files.
 void suggest_isovalue(RenderArgs &options, const Drawing &drawing, Outputs &outputs) {
   if (!options.frame.isovalues.empty()) return;
@@ -401,11 +310,27 @@ void suggest_isovalue(RenderArgs &options, const Drawing &drawing, Outputs &outp
   outputs = check_outputs(options, drawing.views.count);
 }
 
+/// Each process makes its own. On CPUs, all of a host wait for the first one, which compiles the
+/// kernels for all of them: the driver keeps them.
+void make_renderers(RenderArgs &options, Drawing &drawing) {
+  const bool is_on_cpu = drawing.is_team() && drawing.device->info().type == ocl::DeviceType::kCpu;
+  const bool is_first = !is_on_cpu || MpiJob::local_rank() == 0;
+  for (const bool turn_of_first : {true, false}) {
+    together(drawing.team, [&] {
+      if (is_first == turn_of_first) make_renderer(options, drawing);
+    });
+  }
+}
+
 /// Opens the device, if one draws, loads the volume and makes the renderer.
 void set_up(const CLI::App &command, RenderArgs &options, Drawing &drawing) {
   Outputs outputs;
   together(drawing.team, [&] {
-    if (drawing.team.rank() == 0) outputs = check_outputs(options, drawing.views.count);
+    if (drawing.team.rank() == 0) {
+      outputs = check_outputs(options, drawing.views.count);
+      if (const ImageSize &size = drawing.views.size; !options.movie.empty())
+        drawing.movie.emplace(options.movie, size.width, size.height, options.fps);
+    }
     choose_drawing(command, options, drawing);
     if (!options.reference && !drawing.on_host())
       drawing.device = open_device(options, drawing.is_team());
@@ -422,17 +347,54 @@ void set_up(const CLI::App &command, RenderArgs &options, Drawing &drawing) {
   }
   together(drawing.team, [&] {
     outputs.make_folder();
-    options.clip = read_clip(options.clip_options, drawing.info());
-    make_renderer(options, drawing);
+    if (options.scene.file.empty()) {
+      options.clip = read_clip(options.clip_options, drawing.info());
+      options.slices = read_slices(options.slice_options, drawing.info(), drawing.appearance);
+    }
   });
+  make_renderers(options, drawing);
   if (compiling) compiling->finish();
-  const bool fits_surface = options.frame.orbit == 0 && options.frame.cameras.empty();
+  const bool fits_surface = options.frame.orbit == 0 && !drawing.views.file;
   if (fits_surface) {
-    drawing.cameras = {drawing.renderer->core().camera(
-        drawn_isovalues(drawing.volume(), options.frame.isovalues), drawing.views.size)};
+    const auto isovalues = drawn_isovalues(drawing.volume(), all_isovalues(options));
+    const std::uint32_t num_views = drawing.views.count;
+    drawing.cameras = turntable(
+        drawing.renderer->core().camera(isovalues, drawing.views.size, num_views), num_views);
   }
   if (options.parallel)
     std::ranges::transform(drawing.cameras, drawing.cameras.begin(), in_parallel);
+}
+
+/// What is drawn, as options say it.
+void read_scene_of_options(RenderArgs &options, Drawing &drawing) {
+  options.surfaces = read_surfaces(options.surface_texts);
+  if (!options.surfaces.empty()) options.frame.isovalues = {options.surfaces.front().isovalue};
+  drawing.appearance.surface = parse_color("--color", options.color);
+  read_background(options.background, drawing.appearance);
+  drawing.appearance.transparent = options.transparent;
+  read_color_map(options.color_map, drawing.appearance);
+  read_light(options.light, drawing.appearance);
+}
+
+/// What is drawn, as --scene says it. Options may name another volume and other cameras.
+void read_scene_of_file(const CLI::App &command, RenderArgs &options, Drawing &drawing) {
+  const isowave::Scene scene = read_scene_option(command, options.scene);
+  const isowave::FrameRequest request = isowave::scene_request(scene);
+  if (options.input.empty()) options.input = scene.volume.string();
+  options.frame.isovalues = {request.isovalue};
+  options.surfaces = request.surfaces;
+  options.slices = request.slices;
+  options.clip = core_clip(request.clip, request.caps);
+  drawing.appearance = request.appearance;
+  options.color_map.field = scene.field.string();
+  options.color_map.by_field = drawing.appearance.color_by_field;
+  if (options.color_map.by_field && scene.field.empty())
+    throw Error("{}: its colours are by a field, and it names none: add \"field\", a file",
+                options.scene.file);
+  options.transparent = request.appearance.transparent;
+  options.light.shadow_rays = request.appearance.shadow_rays;
+  if (scene.camera && options.frame.orbit == 0 && !drawing.views.file)
+    drawing.views.file = CameraFile{{}, {}, {}, {}, {core_camera(*scene.camera)}};
 }
 
 void run_render(const CLI::App &command, RenderArgs options) {
@@ -446,21 +408,36 @@ void run_render(const CLI::App &command, RenderArgs options) {
   options.voxel_pixels = options.renderer_flags.voxel_pixels;
   options.names_picture = !asks_for_output(options);
   drawing.views = read_views(options.frame);
+  if (options.scene.file.empty()) {
+    read_scene_of_options(options, drawing);
+  } else {
+    read_scene_of_file(command, options, drawing);
+  }
+  count_turntable(options, drawing.views);
+  if (options.input.empty()) throw CLI::RequiredError("VOLUME");
   if (options.names_picture) options.image = default_image(options, drawing.views.count);
   check_options(command, options, drawing.team);
-  drawing.appearance.surface = parse_color("--color", options.color);
-  drawing.appearance.background = parse_color("--background", options.background);
-  drawing.appearance.transparent = options.transparent;
+  find_series(command, options, drawing.team);
+  options.annotations = read_annotations(options.annotation_options, drawing.appearance,
+                                         fs::path(options.input).filename().string());
+  if (options.annotations) {  // or throws, before any work
+    const ImageSize &size = drawing.views.size;
+    annotation_layout(*options.annotations,
+                      {.size = {size.width, size.height}, .appearance = drawing.appearance}, {});
+  }
+  if (!options.scene.save.empty() && num_frames(options, drawing.views.count) > 1)
+    throw Error("--save-scene: a scene is one picture: draw one isovalue from one view");
   set_wanted(options);
   set_up(command, options, drawing);
   if (options.verbose && drawing.on_device != nullptr)
     print_plan(drawing.on_device->memory_plan(), drawing.volume());
   ordered_json frames = ordered_json::array(), own_frames = frames;
-  for (const double isovalue : options.frame.isovalues) {
-    for (std::size_t view = 0; view < drawing.cameras.size(); ++view) {
-      own_frames.emplace_back();
-      frames.push_back(draw_frame({options, drawing, isovalue, view}, own_frames.back()));
-    }
+  draw_step(options, drawing, 0, frames, own_frames);
+  for (std::size_t index = 1; index < options.steps.size(); ++index) {
+    drawing.renderer.reset();  // before the next one takes its memory
+    take_step(options, drawing, index);
+    make_renderer(options, drawing);
+    draw_step(options, drawing, index, frames, own_frames);
   }
   ordered_json document = drawing.is_team() ? document_of_team(options, drawing, frames, own_frames)
                                             : document_of_one(options, drawing, frames);
@@ -473,6 +450,9 @@ void run_render(const CLI::App &command, RenderArgs options) {
   }
   together(drawing.team, [&] {
     if (drawing.team.rank() == 0 && !options.stats.empty()) write_json(document, options.stats);
+    if (!drawing.movie) return;
+    drawing.movie->commit();
+    fmt::print("wrote {}: {} pictures\n", options.movie, drawing.movie->num_frames());
   });
   if (options.names_picture) print_picture_name(options, drawing.views.count);
 }

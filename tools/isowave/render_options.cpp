@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
-
 #include "core/base/error.hpp"
 #include "core/frame/ambient_rays.hpp"
 #include "core/frame/renderer.hpp"
@@ -20,17 +18,11 @@ namespace isowave::core::tools {
 
 namespace fs = std::filesystem;
 
-std::array<float, 3> parse_color(const char *option, const std::string &text) {
-  std::uint32_t rgb = 0;
-  const char *end = text.data() + text.size();
-  if (text.size() == 7 && text[0] == '#') {
-    const auto parsed = std::from_chars(text.data() + 1, end, rgb, 16);
-    if (parsed.ec == std::errc{} && parsed.ptr == end) {
-      return {float(rgb >> 16) / 255.0f, float(rgb >> 8 & 255u) / 255.0f,
-              float(rgb & 255u) / 255.0f};
-    }
-  }
-  throw Error("{} {}: give a colour as #RRGGBB", option, text);
+std::vector<double> all_isovalues(const RenderArgs &options) {
+  if (options.surfaces.empty()) return options.frame.isovalues;
+  std::vector<double> isovalues;
+  for (const isowave::Surface &surface : options.surfaces) isovalues.push_back(surface.isovalue);
+  return isovalues;
 }
 
 std::size_t num_frames(const RenderArgs &options, std::size_t num_views) {
@@ -38,30 +30,53 @@ std::size_t num_frames(const RenderArgs &options, std::size_t num_views) {
 }
 
 fs::path frame_path(const fs::path &path, std::size_t num_views, const RenderArgs &options,
-                    double isovalue, std::size_t view) {
-  if (path.empty() || num_frames(options, num_views) == 1) return path;
+                    double isovalue, std::size_t view, std::optional<std::size_t> step) {
+  const bool is_one_of_many = num_frames(options, num_views) > 1;
+  if (path.empty() || (!is_one_of_many && !step)) return path;
+  std::string name = path.stem().string();
+  if (is_one_of_many && options.surfaces.empty()) name += fmt::format("_iso{}", isovalue);
+  if (is_one_of_many) name += fmt::format("_view{}", view);
+  if (step) name += fmt::format("_step{:0{}}", *step, options.step_digits);
   fs::path result = path;
-  result.replace_filename(fmt::format("{}_iso{}_view{}{}", path.stem().string(), isovalue, view,
-                                      path.extension().string()));
+  result.replace_filename(name + path.extension().string());
   return result;
 }
 
 std::string default_image(const RenderArgs &options, std::size_t num_views) {
   const std::string stem = volume_stem(options.input);
-  if (num_frames(options, num_views) > 1 || options.frame.isovalues.empty()) return stem + ".png";
-  return fmt::format("{}_iso{}.png", stem, options.frame.isovalues.front());
+  const bool frame_path_has_isovalue =
+      num_frames(options, num_views) > 1 && options.surfaces.empty();
+  if (frame_path_has_isovalue || options.frame.isovalues.empty()) return stem + ".png";
+  return fmt::format("{}_iso{}.png", stem, fmt::join(all_isovalues(options), "_"));
+}
+
+bool draws_layers(const RenderArgs &options) {
+  return !options.surfaces.empty() || !options.slice_options.planes.empty() ||
+         !options.slices.empty();
+}
+
+void print_picture_name(const RenderArgs &options, std::size_t num_views) {
+  std::string name = options.image;
+  if (num_frames(options, num_views) > 1)
+    name = fmt::format("{}_viewK.png", options.surfaces.empty()
+                                           ? volume_stem(options.input) + "_isoV"
+                                           : fs::path(options.image).stem().string());
+  if (!options.series.empty()) name = fmt::format("{}_stepT.png", fs::path(name).stem().string());
+  fmt::print("wrote {}; --output names another file\n", name);
 }
 
 bool asks_for_output(const RenderArgs &options) {
-  for (const std::string *name : {&options.image, &options.depth, &options.stats,
-                                  &options.progress_dir, &options.error_map, &options.refined}) {
+  for (const std::string *name :
+       {&options.image, &options.depth, &options.stats, &options.progress_dir, &options.error_map,
+        &options.refined, &options.movie}) {
     if (!name->empty()) return true;
   }
   return false;
 }
 
 bool asks_for_picture(const RenderArgs &options) {
-  return !options.image.empty() || !options.progress_dir.empty() || !options.refined.empty();
+  return !options.image.empty() || !options.progress_dir.empty() || !options.refined.empty() ||
+         !options.movie.empty();
 }
 
 bool draws_bounds(const RenderArgs &options) {
@@ -95,9 +110,74 @@ void check_choice(const RenderArgs &options) {
         "--max-surface-error chooses the detail: leave out --voxel-error and --voxel-pixels");
 }
 
+/// Checks what --slice excludes.
+void check_slice_options(const CLI::App &command, const RenderArgs &options, const Team &team) {
+  if (options.slice_options.planes.empty() && options.slices.empty()) return;
+  isowave::Appearance appearance;
+  const std::size_t num_slices =
+      std::max(options.slices.size(), read_slices(options.slice_options, {}, appearance).size());
+  const std::size_t num_surfaces = std::max<std::size_t>(1, options.surfaces.size());
+  if (num_surfaces + num_slices > ISO_MAX_SURFACES)
+    throw Error("{} surfaces and {} slices are more than a frame can have: give at most {}",
+                num_surfaces, num_slices, ISO_MAX_SURFACES);
+  if (team.size() > 1) throw Error("--slice: a team draws without slices");
+  refuse_options(
+      command, {"--ambient", "--shadow", "--voxel-pixels", "--max-surface-error", "--time-budget"},
+      "--slice draws without it: leave out either");
+  if (options.renderer_flags.pipeline == "blocks")
+    refuse_options(command, {"--slice"}, "--pipeline blocks draws one opaque surface");
+  if (solver_from_string(options.renderer_flags.solver).kind != kDefaultSolver.kind)
+    refuse_options(command, {"--slice"}, "needs --solver bernstein");
+}
+
+/// Checks what --surface excludes. Further options that exclude each other are checked by each.
+void check_surface_options(const CLI::App &command, const RenderArgs &options, const Team &team) {
+  if (options.surfaces.empty()) return;
+  refuse_options(command, {"--isovalue"},
+                 "draws pictures of one surface each, --surface one of all: leave out either");
+  refuse_options(command, {"--color"}, "surfaces have colours of their own: --surface VALUE,COLOR");
+  refuse_options(
+      command, {"--ambient", "--shadow", "--voxel-pixels", "--max-surface-error", "--time-budget"},
+      "--surface draws without it: leave it out, or draw one surface by --isovalue");
+  if (options.renderer_flags.pipeline == "blocks")
+    refuse_options(command, {"--surface"}, "--pipeline blocks draws one opaque surface");
+  if (solver_from_string(options.renderer_flags.solver).kind != kDefaultSolver.kind)
+    refuse_options(command, {"--surface"}, "needs --solver bernstein");
+  if (team.size() > 1)
+    refuse_options(command, {"--progress-dir"},
+                   "with mpirun, --surface draws no pictures of passes: leave out either");
+}
+
+/// Checks --movie and --turntable.
+void check_movie_options(const CLI::App &command, const RenderArgs &options) {
+  if (options.turntable > 0)
+    refuse_options(command, {"--orbit"}, "--turntable draws the views: leave out either");
+  if (options.movie.empty()) {
+    refuse_options(command, {"--fps"}, "no movie is written: give --movie");
+    return;
+  }
+  refuse_options(command, {"--transparent"}, "movies have no transparency: leave out --movie");
+  refuse_options(command, {"--time-budget"},
+                 "draws pictures of several sizes, and a movie has one: leave out either");
+}
+
 }  // namespace
 
+void count_turntable(const RenderArgs &options, Views &views) {
+  if (options.turntable == 0) return;
+  views.count = options.turntable;
+  if (!views.file) return;
+  std::vector<Camera> &cameras = views.file->cameras;
+  if (cameras.size() > 1)
+    throw Error("--turntable turns one camera, and {} has {}: leave out either",
+                options.frame.cameras, cameras.size());
+  cameras = turntable(cameras.front(), options.turntable);
+}
+
 void check_options(const CLI::App &command, const RenderArgs &options, const Team &team) {
+  check_surface_options(command, options, team);
+  check_slice_options(command, options, team);
+  check_movie_options(command, options);
   if (team.size() > 1) {
     refuse_options(command, {"--reference", "--verbose"},
                    fmt::format("cannot be used with mpirun: {} processes draw parts of the volume",
@@ -112,8 +192,19 @@ void check_options(const CLI::App &command, const RenderArgs &options, const Tea
   if (options.reference && !options.progress_dir.empty())
     throw Error("--reference has no passes: leave out --progress-dir");
   if (!asks_for_picture(options)) {
-    refuse_options(command, {"--color", "--background", "--transparent", "--normals", "--ambient"},
+    refuse_options(command,
+                   {"--color", "--color-by", "--background", "--light", "--shadow", "--light-angle",
+                    "--transparent", "--normals", "--ambient", "--slice"},
                    "no picture is written: give --output");
+  }
+  if (options.image.empty() && options.refined.empty() && options.movie.empty())
+    refuse_options(command, {"--annotate"}, "no picture is annotated: give --output");
+  if (!options.color_map.by.empty() && !options.color_map.by_field)
+    refuse_options(command, {"--color"}, "--color-by colours surfaces: leave out either");
+  if (options.color_map.by_field) {
+    if (team.size() > 1) throw Error("colours by a field: a team draws without them");
+    refuse_options(command, {"--surface", "--slice", "--time-budget"},
+                   "colours by a field are drawn of one opaque surface, without a time");
   }
   if (options.transparent)
     refuse_options(command, {"--background"}, "pictures with --transparent have none");
@@ -145,26 +236,35 @@ std::string find_device_option(const CLI::App &command) {
 Outputs check_outputs(const RenderArgs &options, std::size_t num_views) {
   Outputs outputs;
   outputs.read_volume(options.input);
+  for (const SeriesStep &step : options.series) outputs.read_volume(step.path);
   if (!options.frame.cameras.empty()) outputs.read(options.frame.cameras);
+  if (!options.scene.file.empty()) outputs.read(options.scene.file);
+  if (options.color_map.by_field && options.color_map.field != "volume")
+    outputs.read_volume(options.color_map.field);
   outputs.write("--stats", options.stats);
+  outputs.write("--save-scene", options.scene.save);
+  outputs.write("--movie", options.movie);
   // A suggested isovalue, which is not known yet, changes the names of files, not their folders.
   std::vector<double> isovalues = options.frame.isovalues;
   if (isovalues.empty()) isovalues = {0};
-  for (const double isovalue : isovalues) {
-    for (std::size_t view = 0; view < num_views; ++view) {
-      const auto write = [&](const char *option, const std::string &name) {
-        outputs.write(option, frame_path(name, num_views, options, isovalue, view));
-      };
-      write("--output", options.image);
-      write("--depth", options.depth);
-      write("--error-map", options.error_map);
-      write("--refined", options.refined);
-    }
+  std::vector<std::optional<std::size_t>> steps(options.steps.begin(), options.steps.end());
+  if (steps.empty()) steps.emplace_back();
+  for (std::size_t i = 0; i < steps.size() * isovalues.size() * num_views; ++i) {
+    const std::size_t view = i % num_views, number = i / num_views;
+    const auto write = [&](const char *option, const std::string &name) {
+      outputs.write(option,
+                    frame_path(name, num_views, options, isovalues[number % isovalues.size()], view,
+                               steps[number / isovalues.size()]));
+    };
+    write("--output", options.image);
+    write("--depth", options.depth);
+    write("--error-map", options.error_map);
+    write("--refined", options.refined);
   }
   outputs.write_pictures("--progress-dir", options.progress_dir, "pass");
   for (const std::string &name : {options.image, options.refined}) check_png_name(name);
   for (const std::string &name : {options.depth, options.error_map}) check_npy_name(name);
-  check_json_name(options.stats);
+  for (const std::string &name : {options.stats, options.scene.save}) check_json_name(name);
   return outputs;
 }
 
@@ -185,10 +285,14 @@ namespace {
 /// Options of every day come first, those of researchers last.
 void group_render_options(CLI::App &command) {
   group_options(command, "Options of every day",
-                {"--help", "--isovalue", "--output", "--size", "--samples", "--orbit", "--cameras",
-                 "--parallel", "--color", "--background", "--transparent", "--normals", "--ambient",
-                 "--device"});
-  group_options(command, "Clipping", {"--clip", "--clip-box", "--no-caps"});
+                {"--help",       "--isovalue",    "--surface",  "--scene",     "--output",
+                 "--size",       "--samples",     "--orbit",    "--turntable", "--steps",
+                 "--cameras",    "--parallel",    "--color",    "--color-by",  "--color-map",
+                 "--background", "--transparent", "--light",    "--shadow",    "--light-angle",
+                 "--normals",    "--ambient",     "--annotate", "--units",     "--device"});
+  group_options(command, "Clipping and slices",
+                {"--clip", "--clip-box", "--no-caps", "--slice", "--slice-opacity", "--slice-map",
+                 "--slice-range"});
   group_volume_options(command);
   group_compression_options(command);
   group_options(command, "Precision and time",
@@ -197,22 +301,73 @@ void group_render_options(CLI::App &command) {
   group_options(command, "Memory", {"--memory-budget", "--cache-slots", "--stream", "--verbose"});
   group_options(command, "Several processes, by mpirun", {"--bricks"});
   group_options(command, "Further outputs",
-                {"--depth", "--stats", "--no-stage-times", "--progress-dir"});
+                {"--movie", "--fps", "--depth", "--save-scene", "--stats", "--no-stage-times",
+                 "--progress-dir"});
   group_options(command, "For researchers",
                 {"--reference", "--pipeline", "--speculation", "--max-speculation", "--solver",
                  "--grouping", "--closest", "--group-size"});
 }
 
+void add_color_options(CLI::App &command, RenderArgs &options) {
+  command.add_option("--color", options.color, "surface colour: #RRGGBB, or a name of --surface")
+      ->capture_default_str();
+  add_color_map_options(command, options.color_map);
+  add_light_options(command, options.light);
+  command
+      .add_option(
+          "--background", options.background,
+          "background colour: #RRGGBB, or a name of --surface; with two, a gradient from the "
+          "lower edge to the upper")
+      ->type_name("COLOR[,COLOR]")
+      ->capture_default_str();
+  command.add_flag("--transparent", options.transparent,
+                   "RGBA pictures instead of a background: alpha is the share of a pixel's rays "
+                   "that hit, and the colour is theirs (straight alpha)");
+}
+
+void add_picture_options(CLI::App &command, RenderArgs &options) {
+  command
+      .add_option(
+          "--steps", options.steps_text,
+          "steps of a series that are drawn: FIRST:LAST, both counted from 0 and both drawn, "
+          "or one number; with FIRST:LAST:STRIDE not all between. A series is a quoted "
+          "pattern of files, 'run_*.nrrd', in natural order, or a NIfTI or NRRD file with a "
+          "fourth axis. All steps have the cameras of the first. The next step is read while "
+          "one is drawn, so memory holds two [all]")
+      ->type_name("FIRST[:LAST[:STRIDE]]");
+  command
+      .add_option(
+          "--turntable", options.turntable,
+          "number of views once around the surfaces, about +y, from so far that they are in "
+          "all pictures; a camera of --cameras or --scene is turned about its own up axis "
+          "[--orbit looks at the whole volume]")
+      ->check(CLI::Range(1u, kMostViews));
+  command.add_option("--output,-o", options.image,
+                     "PNG of the picture; NAME_isoV_viewK.png, with --surface NAME_viewK.png, if "
+                     "there are several frames, and NAME_..._stepT.png of a series "
+                     "[VOLUME_isoV.png in the current folder, if no other output is asked for]");
+  command.add_option("--movie", options.movie,
+                     "MP4 of all pictures in their order: of each step, each isovalue, all views. "
+                     "The program ffmpeg makes it, H.264, of an even width and height");
+  command.add_option("--fps", options.fps, "pictures a second of --movie")->capture_default_str();
+  command.add_option("--depth", options.depth,
+                     "float32 .npy [H,W]: distance from the eye, inf if nothing is hit; with "
+                     "--samples for each ray");
+}
+
 }  // namespace
 
 void add_render_options(CLI::App &command, RenderArgs &options) {
-  command.add_option("VOLUME", options.input, "a .zfp file, or " + std::string(kVolumeHelp))
-      ->required();
+  command.add_option(
+      "VOLUME", options.input,
+      fmt::format("a .zfp file, or {}; or several, see --steps [that of --scene]", kVolumeHelp));
   add_volume_options(command, options.volume);
   add_frame_options(command, options.frame)
       ->description(
-          "isovalue; repeat it for more surfaces, each drawn from all views [the first that "
+          "isovalue; repeat it for more pictures, of each isovalue from all views [the first that "
           "`isowave info` suggests]");
+  add_surface_option(command, options.surface_texts);
+  add_scene_options(command, options.scene);
   command
       .add_option("--samples", options.frame.samples,
                   "N x N rays per pixel, whose mean colour it gets; other options still count the "
@@ -231,21 +386,13 @@ void add_render_options(CLI::App &command, RenderArgs &options) {
   command.add_flag("--parallel", options.parallel,
                    "draw all views in parallel (orthographic) projection; the point that a camera "
                    "looks at keeps its scale");
-  command.add_option("--color", options.color, "surface colour #RRGGBB")->capture_default_str();
-  command.add_option("--background", options.background, "background colour #RRGGBB")
-      ->capture_default_str();
-  command.add_flag("--transparent", options.transparent,
-                   "RGBA pictures instead of a background: alpha is the share of a pixel's rays "
-                   "that hit, and the colour is theirs (straight alpha)");
+  add_color_options(command, options);
   add_normals_option(command, options.normals);
   add_ambient_option(command, options.ambient_rays);
+  add_annotation_options(command, options.annotation_options);
   add_clip_options(command, options.clip_options);
-  command.add_option("--output,-o", options.image,
-                     "PNG of the picture; NAME_isoV_viewK.png if there are several frames "
-                     "[VOLUME_isoV.png in the current folder, if no other output is asked for]");
-  command.add_option("--depth", options.depth,
-                     "float32 .npy [H,W]: distance from the eye, inf if nothing is hit; with "
-                     "--samples for each ray");
+  add_slice_options(command, options.slice_options);
+  add_picture_options(command, options);
   command.add_option(
       "--max-surface-error", options.max_surface_error,
       "largest distance to the surface of the uncompressed volume [pixels]: levels of detail and "

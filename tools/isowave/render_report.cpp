@@ -42,6 +42,13 @@ std::string_view errors_of(const CompressedVolume &volume) {
 
 }  // namespace
 
+nlohmann::ordered_json report_layers(const LayerStats &layers) {
+  if (layers.rays_cut != 0)
+    warn(fmt::format("{} rays have more than {} hits; what lies behind is left out",
+                     with_commas(layers.rays_cut), ISO_MAX_LAYERS));
+  return {{"layers", layers.layers}, {"hits", layers.hits}, {"rays_cut", layers.rays_cut}};
+}
+
 nlohmann::ordered_json report_steps(const FrameStats &stats, double budget_ms) {
   nlohmann::ordered_json steps = nlohmann::ordered_json::array();
   for (const TimedStep &step : stats.steps) {
@@ -155,7 +162,7 @@ nlohmann::ordered_json options_json(const RenderArgs &options, ImageSize size,
   nlohmann::ordered_json json = {{"size", {size.width, size.height}},
                                  {"samples", size.samples},
                                  {"views", num_views},
-                                 {"isovalues", options.frame.isovalues},
+                                 {"isovalues", all_isovalues(options)},
                                  {"isovalue_suggested", options.isovalue_suggested},
                                  {"voxel_error", options.frame.voxel_error},
                                  {"reference", options.reference}};
@@ -164,7 +171,16 @@ nlohmann::ordered_json options_json(const RenderArgs &options, ImageSize size,
   json["normals"] = options.normals;
   json["ambient"] = options.ambient_rays;
   json["transparent"] = options.transparent;
+  if (!options.light.direction.empty())
+    json["light"] = {{"direction", options.light.direction},
+                     {"shadow_rays", options.light.shadow_rays},
+                     {"angle", options.light.angle}};
+  if (!options.scene.file.empty()) json["scene"] = options.scene.file;
+  if (!options.color_map.by.empty())
+    json["color_by"] = {{"axis", options.color_map.by}, {"map", options.color_map.map}};
   json["clip"] = clip_json(options.clip);
+  if (!options.surfaces.empty()) json["surfaces"] = surfaces_json(options.surfaces);
+  if (!options.slices.empty()) json["slices"] = slices_json(options.slices);
   return json;
 }
 

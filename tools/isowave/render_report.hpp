@@ -13,6 +13,8 @@
 
 namespace isowave::core::tools {
 
+/// With --surface: warns of rays that are cut. Returns the JSON of a frame's layers.
+nlohmann::ordered_json report_layers(const LayerStats &layers);
 /// Prints the steps of a frame within a time budget. Returns their JSON.
 nlohmann::ordered_json report_steps(const FrameStats &stats, double budget_ms);
 /// Prints how the detail of a frame was chosen by sample. Returns its JSON.

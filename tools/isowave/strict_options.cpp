@@ -109,6 +109,15 @@ void refuse_empty_values(CLI::App &app, int argc, char **argv) {
   }
 }
 
+std::vector<std::string_view> split_at_commas(std::string_view text) {
+  std::vector<std::string_view> fields;
+  for (std::size_t begin = 0, end = 0; end != text.npos; begin = end + 1) {
+    end = text.find(',', begin);
+    fields.push_back(text.substr(begin, end - begin));
+  }
+  return fields;
+}
+
 CLI::Validator fits_float32() {
   return CLI::Validator(
       [](std::string &value) -> std::string {

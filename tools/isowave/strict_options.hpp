@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace isowave::core::tools {
 
@@ -25,6 +26,9 @@ std::optional<double> parse_finite(std::string_view text);
 /// "12kB" is 12000, "1KiB" is 1024, "12" is 12; none if it is not such a number above 0, or more
 /// than 64 bits hold.
 std::optional<std::uint64_t> parse_bytes(std::string_view text);
+
+/// The fields between commas, also empty ones.
+std::vector<std::string_view> split_at_commas(std::string_view text);
 
 /// A validator: a number that float32 can hold without becoming infinite.
 CLI::Validator fits_float32();

@@ -22,6 +22,7 @@
 #include "tools/isowave/strict_options.hpp"
 #include "tools/isowave/verify_errors.hpp"
 #include "tools/isowave/verify_frames.hpp"
+#include "tools/isowave/verify_layers.hpp"
 
 namespace isowave::core::tools {
 
@@ -116,20 +117,26 @@ void check_options(const CLI::App &command, const VerifyArgs &options) {
   for (const std::string &name : options.solvers) solver_from_string(name);
   if (options.frames.input.empty()) {
     refuse_options(command,
-                   {"--oracle", "--clip", "--clip-box", "--no-caps", "--isovalue", "--voxel-error",
-                    "--size", "--orbit", "--cameras", "--dims", "--type", "--spacing", "--rate",
-                    "--tolerance", "--tolerance-relative", "--exact"},
+                   {"--oracle", "--clip", "--clip-box", "--no-caps", "--surface", "--isovalue",
+                    "--voxel-error", "--size", "--orbit", "--cameras", "--dims", "--type",
+                    "--spacing", "--rate", "--tolerance", "--tolerance-relative", "--exact"},
                    "is for frames: give a VOLUME");
   } else {
     refuse_options(command, {"--rays", "--watertight", "--seed"},
                    "is for the suite: leave out VOLUME");
-    if (options.frames.frame.isovalues.empty())
-      throw Error("{}: give --isovalue", options.frames.input);
+    if (options.frames.frame.isovalues.empty() && options.frames.surfaces.empty())
+      throw Error("{}: give --isovalue or --surface", options.frames.input);
   }
   if (!read_clip(options.frames.clip, {}).planes.empty()) {
     refuse_options(command, {"--oracle"}, "clipped frames have an oracle of their own");
     refuse_options(command, {"--max-surface-error"}, "errors are proven of whole surfaces");
   }
+  if (!options.frames.surfaces.empty()) {
+    refuse_options(command, {"--isovalue", "--oracle", "--solver", "--max-surface-error"},
+                   "frames of --surface have isovalues, an oracle and a solver of their own");
+  }
+  if (options.frames.device == "host")
+    refuse_options(command, {"--solver"}, "the host draws by the default solver");
   refuse_options(command, {"--levels"},
                  options.frames.max_surface_error ? "--max-surface-error has all levels of detail"
                                                   : "the finest level alone is judged");
@@ -151,6 +158,8 @@ void run_verify(const CLI::App &command, VerifyArgs options) {
     if (options.frames.input.empty() || !all)
       throw Error("--max-surface-error is for frames by the default solver: give a VOLUME alone");
     failures = verify_errors(options.frames, document);
+  } else if (!options.frames.surfaces.empty()) {
+    failures = verify_layers(options.frames, document);
   } else if (!options.frames.input.empty()) {
     if (all) options.solvers = {std::string(judged)};
     failures = verify_frames(options.frames, options.solvers, document);

@@ -32,8 +32,8 @@ std::uint64_t verify_errors(const VerifyFramesOptions &options, nlohmann::ordere
   fmt::print("device {}: {} ({})\n", info.index, info.name, info.platform);
   ocl::Device device(info);
   CompileReport compiling(device);
-  const Scene scene =
-      load_scene(options.input, options.volume, frame_options, read_views(frame_options));
+  const VolumeAndViews scene = load_volume_and_views(options.input, options.volume, frame_options,
+                                                     read_views(frame_options));
   const glm::uvec3 dims = scene.volume.info.dims;
   std::vector<double> source(scene.volume.info.num_voxels());
   open_any_volume(options.input, to_overrides(options.volume))

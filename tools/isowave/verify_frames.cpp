@@ -8,6 +8,7 @@
 #include <span>
 
 #include "core/base/error.hpp"
+#include "core/host/host_renderer.hpp"
 #include "core/render/device_renderer.hpp"
 #include "core/zfp/isovalue.hpp"
 #include "reference/cell_oracle.hpp"
@@ -66,33 +67,6 @@ FrameJudge make_judge(const std::string &name, std::span<const float> voxels, co
                               "every cell, certified");
   judge.uses_embree = false;
   return judge;
-}
-
-/// The scalar reference, or a device's renderer.
-struct Drawer {
-  std::unique_ptr<ocl::Device> device;  ///< before the renderer, which it must outlive
-  std::unique_ptr<Renderer> renderer;
-
-  std::string name() const { return device ? device->info().name : "scalar reference"; }
-};
-
-Drawer make_drawer(const Scene &scene, const std::string &device, Solver solver) {
-  Drawer drawer;
-  if (device.empty()) {
-    drawer.renderer = std::make_unique<TwinRenderer>(scene.volume, scene.size, solver);
-    return drawer;
-  }
-  const ocl::DeviceInfo info = ocl::choose_device(device);
-  fmt::print("device {}: {} ({})\n", info.index, info.name, info.platform);
-  drawer.device = std::make_unique<ocl::Device>(info);
-  CompileReport compiling(*drawer.device);
-  RendererOptions options;
-  options.size = scene.size;
-  options.solver = solver;
-  options.with_shading = false;
-  drawer.renderer = std::make_unique<DeviceRenderer>(*drawer.device, scene.volume, options);
-  compiling.finish();
-  return drawer;
 }
 
 /// Sums of the rows and the JSON entries of a run.
@@ -160,10 +134,38 @@ std::vector<FrameJudge> make_judges(const std::vector<std::string> &names,
 
 }  // namespace
 
+Drawer make_drawer(const VolumeAndViews &scene, const std::string &device, Solver solver,
+                   std::uint32_t max_surfaces) {
+  Drawer drawer;
+  if (device.empty()) {
+    drawer.renderer = std::make_unique<TwinRenderer>(scene.volume, scene.size, solver);
+    return drawer;
+  }
+  if (device == "host") {
+    drawer.name = device;
+    drawer.renderer =
+        std::make_unique<HostRenderer>(scene.volume, HostRendererOptions{.largest = scene.size});
+    return drawer;
+  }
+  const ocl::DeviceInfo info = ocl::choose_device(device);
+  fmt::print("device {}: {} ({})\n", info.index, info.name, info.platform);
+  drawer.name = info.name;
+  drawer.device = std::make_unique<ocl::Device>(info);
+  CompileReport compiling(*drawer.device);
+  RendererOptions options;
+  options.size = scene.size;
+  options.solver = solver;
+  options.max_surfaces = max_surfaces;
+  options.with_shading = false;
+  drawer.renderer = std::make_unique<DeviceRenderer>(*drawer.device, scene.volume, options);
+  compiling.finish();
+  return drawer;
+}
+
 std::uint64_t verify_frames(const VerifyFramesOptions &options,
                             const std::vector<std::string> &solvers, ordered_json &document) {
-  const Scene scene =
-      load_scene(options.input, options.volume, options.frame, read_views(options.frame));
+  const VolumeAndViews scene = load_volume_and_views(options.input, options.volume, options.frame,
+                                                     read_views(options.frame));
   const std::vector<std::vector<float>> voxels{
       decode_with_libzfp(scene.volume, options.frame.voxel_error)};
   const Clip clip = read_clip(options.clip, scene.volume.info);
@@ -181,7 +183,7 @@ std::uint64_t verify_frames(const VerifyFramesOptions &options,
         const FrameParams frame =
             make_frame_params(scene.volume.info, scene.cameras[view], scene.size, isovalue);
         const ordered_json labels = {{"volume", options.input},
-                                     {"drawn_by", drawer.name()},
+                                     {"drawn_by", drawer.name},
                                      {"solver", solver},
                                      {"isovalue", isovalue},
                                      {"view", view}};
@@ -221,6 +223,14 @@ void add_verify_frames_options(CLI::App &command, VerifyFramesOptions &options) 
   add_clip_options(command, options.clip);
   command
       .add_option(
+          "--surface", options.surfaces,
+          "a surface as for `isowave render`, whose colour is not judged; repeat it for up "
+          "to 8 surfaces in one frame. All layers of the scalar reference are judged, or the "
+          "first one of what --device names [opacity 1]")
+      ->type_name("VALUE[,COLOR[,OPACITY]]")
+      ->allow_extra_args(false);
+  command
+      .add_option(
           "--oracle", options.oracles,
           "judge of frames: roots (every root on the ray, certified), cells (Embree through the "
           "dual cells) or mesh (Embree and triangles); repeat it [all]")
@@ -232,8 +242,9 @@ void add_verify_frames_options(CLI::App &command, VerifyFramesOptions &options) 
       "compression [pixels]");
   command.add_option(
       "--device", options.device,
-      "device that draws frames, or is tested for leaks beside the scalar reference: index, cpu, "
-      "gpu, or a part of its name [frames: the scalar reference; leaks: as render]");
+      "what draws frames, or is tested for leaks, beside the scalar reference: index, cpu, gpu, or "
+      "a part of a device's name; for frames also host [frames: the scalar reference; leaks: as "
+      "render]");
 }
 
 }  // namespace isowave::core::tools

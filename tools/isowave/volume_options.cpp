@@ -15,6 +15,7 @@
 #include "core/platform/streams.hpp"
 #include "core/sources/generate.hpp"
 #include "core/sources/noise_on_device.hpp"
+#include "core/sources/series.hpp"
 #include "core/stages/zfp_encode.hpp"
 #include "core/zfp/describe_compression.hpp"
 #include "core/zfp/isovalue.hpp"
@@ -109,8 +110,6 @@ bool says_levels(const CompressionOptions &options) {
 
 namespace {
 
-constexpr std::string_view kGenerate = "generate:";
-
 Storage to_storage(const CompressionOptions &options) {
   Storage storage;
   if (!options.tolerance && !options.relative_tolerance && !options.exact)
@@ -185,6 +184,21 @@ void warn_of_isovalue(const CompressedVolume &volume, double isovalue) {
   if (const std::string notice = isovalue_notice(volume, isovalue); !notice.empty()) warn(notice);
 }
 
+/// The text of a pattern: "step" of "step_[0-9]*".
+std::string stem_of_pattern(std::string name) {
+  for (std::size_t at = 0; at < name.size();) {
+    const std::size_t end = name[at] == '[' ? name.find(']', at) : at;
+    if (end == name.npos || std::string_view("*?[").find(name[at]) == std::string_view::npos) {
+      at += 1;
+    } else {
+      name.erase(at, end + 1 - at);
+    }
+  }
+  const auto is_joint = [](char c) { return c == '_' || c == '-' || c == '.'; };
+  while (!name.empty() && is_joint(name.back())) name.pop_back();
+  return name.empty() ? "series" : name;
+}
+
 std::string volume_stem(const std::string &path) {
   std::string name = path.starts_with(kGenerate) ? path.substr(kGenerate.size())
                                                  : std::filesystem::path(path).filename().string();
@@ -194,7 +208,7 @@ std::string volume_stem(const std::string &path) {
       name.resize(name.size() - ending.size());
   }
   std::ranges::replace(name, ':', '_');
-  return name;
+  return is_pattern(path) ? stem_of_pattern(name) : name;
 }
 
 Progress make_progress_bar(std::string_view label) {

@@ -9,6 +9,7 @@ SECTIONS = {
         speed.frames,
         speed.normals,
         speed.ambient,
+        speed.scenes,
         speed.speculation,
         speed.slots,
         speed.budgets,

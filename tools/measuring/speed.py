@@ -87,6 +87,36 @@ def ambient(run):
     ]
 
 
+#: Three clipping planes, which caps close.
+CLIP = ["1,0.2,0", "0,1,0.1", "0,0.1,1"]
+
+
+def scenes(run):
+    """One opaque surface first, then what else scenes have."""
+    kinds = [
+        {},
+        {"clip": ["0,0,1,-100000"]},
+        {"clip": CLIP},
+        {"light": "0.5,1,0.7"},
+        {"light": "0.5,1,0.7", "shadow": 1},
+        {"light": "0.5,1,0.7", "shadow": 16},
+        {"values_of": True},
+        {"slice": ["z"]},
+        {"slice": ["x", "y", "z"]},
+        {"surfaces": 1, "opacity": 1},
+        {"surfaces": 2, "opacity": 1},
+        *({"surfaces": n, "opacity": 0.3} for n in (1, 2, 4, 8)),
+        {"surfaces": 2, "opacity": 0.3, "clip": CLIP},
+    ]
+    rows = []
+    for field in run.fields()[:2]:
+        for kind in kinds:
+            if "values_of" in kind:
+                kind = {"values_of": run.volume(field)}
+            rows.append(frame_row(run, field, normals="smooth", rounds=2, **kind))
+    return rows
+
+
 def speculation(run):
     return [
         frame_row(run, run.fields()[0], speculation=kind, pipeline=pipeline)
@@ -233,6 +263,7 @@ KERNELS = (
     "(ambient|hit_positions|initial_rays|kept_picture|march|request_ahead|resident)/.*width:1280",
     "(march_packets|shade|smooth_normals|start_rays)/.*width:1280",
     "block_cache/.*(uniform|hot)/width:1280/key_bits:18",
+    "layers/.*width:1280",
     "composite/.*width:1280.*n_spec:(1|64)/",
     "group/.*slot_bits:18/visible_bits:14",
     "intersect/width:1280",

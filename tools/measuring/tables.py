@@ -73,6 +73,39 @@ def ambient(rows):
         yield name_of(row["volume"]), n, *thrice(row), ms(each) if n else ""
 
 
+def scenes(rows):
+    """Each volume has a row for each scene, one opaque surface first."""
+    yield "volume", "scene", "cold ms", "next", "warm", "warm, of one surface", "device memory"
+    first = {}
+    for row in rows:
+        arguments = row["arguments"]
+        count, planes = option(row, "--surfaces"), arguments.count("--clip")
+        if row["volume"] not in first:
+            first[row["volume"]] = row["warm"]["median"]
+        scene = "one opaque surface"
+        if option(row, "--light") is not None:
+            shadow = option(row, "--shadow")
+            kinds = {None: "a light", "1": "hard shadows"}
+            scene += ", " + kinds.get(shadow, f"soft shadows of {shadow} rays")
+        if option(row, "--values-of") is not None:
+            scene += ", colours by a second volume"
+        if slices := arguments.count("--slice"):
+            scene += f", {slices} slice" + ("s" if slices > 1 else "")
+        if count is not None:
+            opacity = float(option(row, "--opacity"))
+            scene = f"{count} in layers, opacity {opacity:g}"
+        if planes:
+            far = "-100000" in " ".join(arguments)
+            scene += ", a plane that cuts nothing" if far else f", {planes} planes with caps"
+        yield (
+            name_of(row["volume"]),
+            scene,
+            *thrice(row),
+            f"{row['warm']['median'] / first[row['volume']]:.1f}",
+            mebibytes(row["memory"]),
+        )
+
+
 def speculation(rows):
     yield "pipeline", "speculation", "cold ms", "next", "warm", "passes", "blocks decoded"
     for row in rows:
@@ -472,6 +505,7 @@ TABLES = {
         ("frames", frames),
         ("normals", normals),
         ("ambient", ambient),
+        ("scenes", scenes),
         ("speculation", speculation),
         ("slots", slots),
         ("budgets", budgets),

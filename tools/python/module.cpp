@@ -50,6 +50,7 @@ NB_MODULE(_core, m) {
 
   add_volumes(m);
   add_renderers(m);
+  add_annotations(m);
 }
 
 }  // namespace isowave_python

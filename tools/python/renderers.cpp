@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <thread>
 #include <type_traits>
 
 #include "module.hpp"
+#include "requests.hpp"
 
 namespace isowave_python {
 
@@ -88,6 +90,13 @@ nb::dict statistics_dict(const isowave::FrameStatistics &statistics) {
   result["normals_ms"] = statistics.normals_ms;
   result["ambient_passes"] = statistics.ambient_passes;
   result["ambient_ms"] = statistics.ambient_ms;
+  result["field_ms"] = statistics.field_ms;
+  result["field_range"] = nb::none();
+  if (const auto &range = statistics.field_range)
+    result["field_range"] = nb::make_tuple((*range)[0], (*range)[1]);
+  result["color_range"] = nb::none();
+  if (const auto &range = statistics.color_range)
+    result["color_range"] = nb::make_tuple((*range)[0], (*range)[1]);
   result["uploaded_bytes"] = statistics.uploaded_bytes;
   result["first_level"] = statistics.first_level;
   result["last_level"] = statistics.last_level;
@@ -96,18 +105,28 @@ nb::dict statistics_dict(const isowave::FrameStatistics &statistics) {
   result["cancelled"] = statistics.cancelled;
   result["complete"] = statistics.complete;
   result["errors_are_stated"] = statistics.errors_are_stated;
+  result["layers"] = statistics.layers;
+  result["layer_hits"] = statistics.layer_hits;
+  result["rays_cut"] = statistics.rays_cut;
   result["stage_ms"] = statistics.stage_ms;
   return result;
 }
 
-/// Adds frame.hits as cells [rows][columns][3] and levels [rows][columns].
+/// Adds frame.hits as cells [rows][columns][3], and [rows][columns] levels, surfaces, which are -1
+/// if nothing is hit, and caps, which are 0 or 1.
 void add_hits(const isowave::Frame &frame, nb::dict &result) {
   std::vector<Index3> cells;
   std::vector<std::uint32_t> levels;
+  std::vector<std::int8_t> surfaces;
+  std::vector<std::uint8_t> caps;
   for (const isowave::Hit &hit : frame.hits) {
     cells.push_back(hit.cell);
     levels.push_back(hit.level);
+    surfaces.push_back(std::isinf(hit.t) ? std::int8_t{-1} : std::int8_t(hit.surface));
+    caps.push_back(hit.cap ? 1 : 0);
   }
+  result["surfaces"] = to_numpy<std::int8_t>(std::move(surfaces), {frame.rows, frame.columns});
+  result["caps"] = to_numpy<std::uint8_t>(std::move(caps), {frame.rows, frame.columns});
   result["cells"] = to_numpy<std::uint32_t>(std::move(cells), {frame.rows, frame.columns, 3});
   result["levels"] = to_numpy<std::uint32_t>(std::move(levels), {frame.rows, frame.columns});
 }
@@ -124,6 +143,8 @@ nb::dict frame_dict(isowave::Frame &&frame, bool is_of_rays = false) {
     result["normals"] = to_numpy<float>(std::move(frame.normals), {rows, columns, 3});
   if (is_of_rays || !frame.positions.empty())
     result["positions"] = to_numpy<double>(std::move(frame.positions), {rows, columns, 3});
+  if (!frame.field.empty())
+    result["field"] = to_numpy<float>(std::move(frame.field), {rows, columns});
   if (!frame.bounds.empty())
     result["bounds"] = to_numpy<float>(std::move(frame.bounds), {rows, columns});
   if (is_of_rays || !frame.hits.empty()) add_hits(frame, result);
@@ -148,64 +169,6 @@ nb::dict frame_dict(isowave::Frame &&frame, bool is_of_rays = false) {
 
 /// [count][6]
 using RayArray = nb::ndarray<double, nb::ro, nb::shape<-1, 6>, nb::c_contig>;
-
-/// "smooth", "cell".
-isowave::Normals normals_of(const std::string &name) {
-  if (name != "smooth" && name != "cell") throw Error("normals '" + name + "': smooth or cell");
-  return name == "smooth" ? isowave::Normals::kSmooth : isowave::Normals::kCell;
-}
-
-/// "proof", "sample".
-isowave::Evidence evidence_of(const std::string &name) {
-  if (name != "proof" && name != "sample") throw Error("by '" + name + "': proof or sample");
-  return name == "proof" ? isowave::Evidence::kProof : isowave::Evidence::kSample;
-}
-
-/// Python does not set FrameRequest::bound.
-isowave::FrameRequest request_of(const nb::dict &options) {
-  isowave::FrameRequest request;
-  const auto get = reader_of(options);
-  isowave::for_each_field(request, [&](const char *name, auto &field) {
-    using Field = std::decay_t<decltype(field)>;
-    if constexpr (std::is_same_v<Field, isowave::Normals>) {
-      std::string text = "smooth";
-      get(name, text);
-      field = normals_of(text);
-    } else if constexpr (std::is_same_v<Field, isowave::Evidence>) {
-      std::string text = "proof";
-      get(name, text);
-      field = evidence_of(text);
-    } else if constexpr (std::is_same_v<Field, std::vector<isowave::Camera>>) {
-      std::vector<nb::dict> cameras;
-      get(name, cameras);
-      for (const nb::dict &camera : cameras)
-        for_each_camera_field(field.emplace_back(), reader_of(camera));
-    } else if constexpr (std::is_same_v<Field, std::vector<isowave::ClipPlane>>) {
-      std::vector<nb::dict> planes;
-      get(name, planes);
-      for (const nb::dict &plane : planes)
-        for_each_plane_field(field.emplace_back(), reader_of(plane));
-    } else if constexpr (!std::is_enum_v<Field>) {
-      get(name, field);
-    }
-  });
-  return request;
-}
-
-isowave::RendererOptions renderer_options_of(const nb::dict &options) {
-  isowave::RendererOptions result;
-  const auto get = reader_of(options);
-  get("width", result.largest.width);
-  get("height", result.largest.height);
-  get("samples", result.largest.samples);
-  get("memory_budget", result.memory_budget);
-  get("cache_blocks", result.cache_blocks);
-  get("with_levels", result.with_levels);
-  get("with_bounds", result.with_bounds);
-  get("with_time_budget", result.with_time_budget);
-  get("with_rays", result.with_rays);
-  return result;
-}
 
 /// A renderer that is no longer wanted while it is being made. A thread of its own waits for the
 /// kernel that is being compiled. A process that ends before leaves the compiler as it is.
@@ -314,7 +277,9 @@ class PyRenderer {
   /// option "quick" draws on the host until kernels are compiled.
   static std::unique_ptr<PyRenderer> make(const std::string &selector, const PyVolume &volume,
                                           const nb::dict &options) {
-    const isowave::RendererOptions wanted = renderer_options_of(options);
+    isowave::RendererOptions wanted = renderer_options_of(options);
+    if (options.contains("field") && !options["field"].is_none())
+      wanted.field = nb::cast<const PyVolume &>(options["field"]).volume;
     const auto get = reader_of(options);
     isowave::DeviceOptions device_options;
     get("profiling", device_options.profiling);
@@ -398,10 +363,25 @@ class PyRenderer {
         true);
   }
 
-  nb::tuple camera(double isovalue, std::uint32_t width, std::uint32_t height) {
+  nb::tuple camera(const std::vector<double> &isovalues, std::uint32_t width,
+                   std::uint32_t height) {
+    std::vector<isowave::Surface> surfaces;
+    for (const double isovalue : isovalues) surfaces.push_back({.isovalue = isovalue});
     return camera_tuple(without_gil([&](Callbacks &) {
-      return renderer_->camera(isovalue, isowave::ImageSize{width, height, 1});
+      return renderer_->camera(surfaces, isowave::ImageSize{width, height, 1});
     }));
+  }
+
+  std::vector<nb::tuple> turntable(const std::vector<double> &isovalues, std::uint32_t num_views,
+                                   std::uint32_t width, std::uint32_t height) {
+    std::vector<isowave::Surface> surfaces;
+    for (const double isovalue : isovalues) surfaces.push_back({.isovalue = isovalue});
+    const std::vector<isowave::Camera> cameras = without_gil([&](Callbacks &) {
+      return renderer_->turntable(surfaces, num_views, isowave::ImageSize{width, height, 1});
+    });
+    std::vector<nb::tuple> result;
+    for (const isowave::Camera &camera : cameras) result.push_back(camera_tuple(camera));
+    return result;
   }
 
   bool ready() const { return renderer_->ready(); }
@@ -446,6 +426,23 @@ std::vector<nb::dict> list_devices() {
 
 void add_renderers(nb::module_ &m) {
   m.def("devices", &list_devices);
+  m.def(
+      "parse_color", [](const std::string &text) { return isowave::parse_color(text); }, "text"_a);
+  m.def("surface_color", &isowave::surface_color, "index"_a);
+  m.def("color_map_names", &isowave::color_map_names);
+  m.def(
+      "read_scene",
+      [](const std::filesystem::path &path) { return dict_of(isowave::read_scene(path)); },
+      "path"_a);
+  m.def(
+      "parse_scene", [](const std::string &text) { return dict_of(isowave::parse_scene(text)); },
+      "text"_a);
+  m.def(
+      "write_scene",
+      [](const nb::dict &scene, const std::filesystem::path &path) {
+        isowave::write_scene(scene_of(scene), path);
+      },
+      "scene"_a, "path"_a);
   nb::class_<PassView>(m, "PassView")
       .def_prop_ro("passes", &PassView::passes)
       .def_prop_ro("completed_percent", &PassView::completed_percent)
@@ -453,7 +450,8 @@ void add_renderers(nb::module_ &m) {
   nb::class_<PyRenderer>(m, "Renderer")
       .def("render", &PyRenderer::render, "request"_a, "on_pass"_a.none(), "interrupts"_a)
       .def("cast_rays", &PyRenderer::cast_rays, "rays"_a, "isovalue"_a, "normals"_a)
-      .def("camera", &PyRenderer::camera, "isovalue"_a, "width"_a, "height"_a)
+      .def("camera", &PyRenderer::camera, "isovalues"_a, "width"_a, "height"_a)
+      .def("turntable", &PyRenderer::turntable, "isovalues"_a, "num_views"_a, "width"_a, "height"_a)
       .def(
           "isovalue_notice",
           [](const PyRenderer &r, double isovalue) {

@@ -100,6 +100,26 @@ PyVolume open_volume(const std::filesystem::path &path, const nb::dict &options,
       [&] { return PyVolume{isowave::open_volume(path, compression, raw)}; });
 }
 
+/// Holds an isowave::Series, which is not thread-safe: the package's calls take turns.
+struct PySeries {
+  std::shared_ptr<isowave::Series> series;
+};
+
+PySeries open_series(const std::vector<std::filesystem::path> &paths, const nb::dict &options,
+                     const std::optional<Index3> &dims, const std::optional<std::string> &type,
+                     const std::optional<Vector3> &spacing) {
+  const isowave::Compression compression = compression_of(options);
+  isowave::RawFile raw{dims, {}, spacing};
+  if (type) raw.type = voxel_type(*type);
+  const WithoutGil no_gil;
+  return {std::make_shared<isowave::Series>(paths, compression, raw)};
+}
+
+PyVolume open_step(const PySeries &self, std::size_t step) {
+  const WithoutGil no_gil;
+  return {self.series->open(step)};
+}
+
 nb::object decode(const PyVolume &self, std::uint32_t level, const Index3 &begin, const Index3 &end,
                   const Index3 &step) {
   std::vector<float> voxels;
@@ -232,6 +252,15 @@ void add_volumes(nb::module_ &m) {
   m.def("compress", &compress, "read"_a, "voxels"_a, "options"_a, "keep"_a, "path"_a.none(),
         "progress"_a.none());
   m.def("compress_array", &compress_array, "array"_a, "voxels"_a, "options"_a, "progress"_a.none());
+  nb::class_<PySeries>(m, "Series")
+      .def_prop_ro("size", [](const PySeries &s) { return s.series->size(); })
+      .def_prop_ro("notices", [](const PySeries &s) { return s.series->notices(); })
+      .def(
+          "name", [](const PySeries &s, std::size_t step) { return s.series->name(step); },
+          "step"_a)
+      .def("open", &open_step, "step"_a);
+  m.def("open_series", &open_series, "paths"_a, "options"_a, "dims"_a.none(), "type"_a.none(),
+        "spacing"_a.none());
   m.def("open", &open_volume, "path"_a, "options"_a, "dims"_a.none(), "type"_a.none(),
         "spacing"_a.none(), "progress"_a.none());
 }

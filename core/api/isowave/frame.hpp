@@ -2,6 +2,7 @@
 // Requests of frames, and the frames that come back.
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -9,6 +10,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "isowave/array.hpp"
@@ -39,15 +41,59 @@ struct Ray {
 
 /// Colours and lights. Colours are sRGB, 0 to 1.
 struct Appearance {
+  /// Colour of the surface, if FrameRequest::surfaces is empty.
   std::array<float, 3> surface{219 / 255.0f, 189 / 255.0f, 135 / 255.0f};
   std::array<float, 3> background{1, 1, 1};
+  /// The background goes linearly, by rows of pixels, from `background` at the picture's lower edge
+  /// to this one at the upper; none: it is uniform.
+  std::optional<std::array<float, 3>> background_top{};
   float ambient = 0.15f;                  ///< light from all around
   float diffuse = 0.5f, specular = 0.2f;  ///< light of a headlight at the eye
-  float above = 0.45f;  ///< light from halfway between the eye and the picture's upper edge
+  /// Light from halfway between the eye and the picture's upper edge, or that of light_direction.
+  float above = 0.45f;
+  /// Direction towards a light of the scene, in world space, of any length above 0. It comes
+  /// instead of the light above, with its weight, and lights the sides that face it.
+  std::optional<Vector3> light_direction{};
+  /// Rays from each hit towards that light, up to 255, that find out whether it is seen from there.
+  /// 0: nothing casts a shadow; 1: hard shadows; more: soft ones. Each takes about as long as a
+  /// frame without any. Needs with_rays; not with FrameRequest::surfaces.
+  std::uint32_t shadow_rays = 0;
+  /// Half of the angle that the light has in soft shadows [degrees], up to 45.
+  double light_angle = 3;
   /// Pictures are RGBA with straight alpha: the share of a pixel's rays that hit, and the mean
-  /// colour of those alone; 0 0 0 0 if none hits. There is no background.
+  /// colour of those alone; 0 0 0 0 if none hits. There is no background. A ray that goes on behind
+  /// translucent surfaces counts as far as they are opaque together.
   bool transparent = false;
+  /// Name of a colour map (color_map_names()) that surfaces are coloured by instead: by a hit's
+  /// distance from the world's origin along color_axis. Empty, without a color_table: their own
+  /// colours.
+  std::string color_map{};
+  std::vector<std::array<float, 3>> color_table{};  ///< 256 colours instead of a map by name
+  Vector3 color_axis{0, 0, 1};                      ///< world space, of any length above 0
+  /// Colours are by the value of the renderer's field at a hit instead (RendererOptions::field),
+  /// trilinear between its voxels. Hits without a value, outside its grid or without data, have
+  /// the surface's own colour. Not with FrameRequest::surfaces and time_budget_ms.
+  bool color_by_field = false;
+  /// With color_by_field: caps have the field's colours, and surfaces their own.
+  bool color_caps_alone = false;
+  /// Distances, or values of the field, of the first and the last colour; none: the least and the
+  /// largest of the volume's box [world units], or of the field at the frame's hits.
+  std::optional<double> color_low{}, color_high{};
+  std::string slice_map = "gray";  ///< name of the colour map of FrameRequest::slices
+  std::vector<std::array<float, 3>> slice_table{};  ///< 256 colours instead of slice_map
+  /// Voxel values of the first and the last of these colours; none: Volume::value_range().
+  std::optional<double> slice_low{}, slice_high{};
 };
+
+/// The colour maps: viridis, magma, cividis, coolwarm, gray.
+std::vector<std::string> color_map_names();
+
+/// The colour of a text: "#RRGGBB", or a name such as "bone", "skin" or "orange".
+///
+/// Throws  Error, which lists the names
+std::array<float, 3> parse_color(std::string_view text);
+/// A colour for surface `index` of a frame, unlike those of its other surfaces; 0: Appearance's.
+std::array<float, 3> surface_color(std::size_t index);
 
 /// The picture so far, for FrameRequest::on_pass, and only until on_pass returns. Several threads
 /// may use it: they take turns.
@@ -76,6 +122,24 @@ struct ClipPlane {
 /// Throws  Error: the box has no inside
 std::array<ClipPlane, 6> box_planes(const Vector3 &begin, const Vector3 &end);
 
+/// An isosurface of a frame of several or translucent ones.
+struct Surface {
+  double isovalue = 0;  ///< as FrameRequest::isovalue; each surface has its own
+  std::array<float, 3> color = Appearance{}.surface;  ///< sRGB, 0 to 1
+  float opacity = 1;    ///< of each crossing, above 0; 1: nothing behind it is seen
+  bool clipped = true;  ///< false: clipping planes leave it whole
+};
+
+/// A plane of a frame that shows the voxels: the points p with dot(normal, p) = offset. Voxels are
+/// trilinear, and have the colours of Appearance::slice_map, without light. Those without data are
+/// not seen.
+struct Slice {
+  Vector3 normal{0, 0, 1};  ///< world space, of any length above 0
+  double offset = 0;        ///< [world units times the normal's length]
+  float opacity = 1;        ///< above 0; 1: nothing behind it is seen
+  bool clipped = true;      ///< false: clipping planes leave it whole
+};
+
 /// One frame: what to draw, how precisely, and which arrays to return. Rendering the same request
 /// again gives the same bits, unless there is a time budget.
 struct FrameRequest {
@@ -89,6 +153,17 @@ struct FrameRequest {
   /// Draws flat caps where planes cut what is inside the surface, which are shaded as the surface.
   /// Otherwise cuts are open, and show the surface from within.
   bool caps = true;
+  /// Up to 8 surfaces in one picture, drawn instead of that of `isovalue`, and blended front to
+  /// back: what lies behind translucent surfaces is seen through them. At most 16 crossings of a
+  /// ray are drawn (FrameStatistics::rays_cut). Empty: the surface of `isovalue` alone, opaque, in
+  /// appearance.surface. A device needs RendererOptions::with_surfaces. Not with bound,
+  /// voxel_pixels, ambient_rays, shadow_rays, color_by_field, max_surface_error, time_budget_ms and
+  /// want_bounds; in a team, not with on_pass.
+  std::vector<Surface> surfaces{};
+  /// Slices beside `surfaces`, or beside that of `isovalue`: up to 8 with the surfaces, blended
+  /// with them, with their conditions. A slice counts as a crossing, is in front of a surface at
+  /// the same place, and has the plane's normal. Not in a team.
+  std::vector<Slice> slices{};
 
   /// Largest distance between voxels of a coarser level of detail [pixels]; 0: the finest level
   /// draws all. Needs RendererOptions::with_levels.
@@ -118,22 +193,27 @@ struct FrameRequest {
   // Arrays that the frame brings to the host.
   bool want_picture = true;
   bool want_depth = false, want_normals = false, want_positions = false, want_hits = false;
+  bool want_field = false;   ///< values of the renderer's field; needs RendererOptions::field
   bool want_bounds = false;  ///< bounds of each pixel's error; needs RendererOptions::with_bounds
 
-  /// Called after each pass, also those for smooth normals and ambient rays; on the host after each
-  /// band of rows, from the top. If it returns false, the frame stops with the picture so far. In a
-  /// team, all processes have an on_pass or none; they return the same, and get the same pictures.
+  /// Called after each pass, also those for smooth normals, a field, ambient and shadow rays; on
+  /// the host after each band of rows, from the top. If it returns false, the frame stops with the
+  /// picture so far. In a team, all processes have an on_pass or none; they return the same, and
+  /// get the same pictures.
   std::function<bool(const Progress &)> on_pass{};
 };
 
-/// First crossing of a ray with the isosurface: the true crossing of the decoded field, not a
-/// sample.
+/// First crossing of a ray with the isosurface, or with the nearest of several: the true crossing
+/// of the decoded field, not a sample.
 struct Hit {
   float t = std::numeric_limits<float>::infinity();  ///< distance from the eye [world units]
   std::uint32_t level = 0;                           ///< level of detail; 0: the finest
   std::array<std::uint32_t, 3> cell{};               ///< voxel at the cell's lowest corner
   std::array<float, 3> position{};                   ///< place in the cell, 0 to 1
   std::array<float, 3> gradient{};  ///< as FrameRequest::normals [voxel value per voxel]
+  /// Index in FrameRequest::surfaces; slices are counted behind them, or from 1 on.
+  std::uint32_t surface = 0;
+  bool cap = false;  ///< on a clipping plane or slice, not on a surface
 };
 
 /// Calls visit(name, field) for each field of a camera.
@@ -155,6 +235,50 @@ void for_each_plane_field(AnyPlane &plane, const Visit &visit) {
   visit("offset", plane.offset);
 }
 
+/// Calls visit(name, field) for each field of a surface.
+template <class AnySurface, class Visit>
+void for_each_surface_field(AnySurface &surface, const Visit &visit) {
+  visit("isovalue", surface.isovalue);
+  visit("color", surface.color);
+  visit("opacity", surface.opacity);
+  visit("clipped", surface.clipped);
+}
+
+/// Calls visit(name, field) for each field of a slice.
+template <class AnySlice, class Visit>
+void for_each_slice_field(AnySlice &slice, const Visit &visit) {
+  visit("normal", slice.normal);
+  visit("offset", slice.offset);
+  visit("opacity", slice.opacity);
+  visit("clipped", slice.clipped);
+}
+
+/// Calls visit(name, field) for each field of an appearance, except `surface`.
+template <class AnyAppearance, class Visit>
+void for_each_appearance_field(AnyAppearance &appearance, const Visit &visit) {
+  visit("background", appearance.background);
+  visit("background_top", appearance.background_top);
+  visit("ambient", appearance.ambient);
+  visit("diffuse", appearance.diffuse);
+  visit("specular", appearance.specular);
+  visit("above", appearance.above);
+  visit("light_direction", appearance.light_direction);
+  visit("shadow_rays", appearance.shadow_rays);
+  visit("light_angle", appearance.light_angle);
+  visit("transparent", appearance.transparent);
+  visit("color_map", appearance.color_map);
+  visit("color_table", appearance.color_table);
+  visit("color_axis", appearance.color_axis);
+  visit("color_by_field", appearance.color_by_field);
+  visit("color_caps_alone", appearance.color_caps_alone);
+  visit("color_low", appearance.color_low);
+  visit("color_high", appearance.color_high);
+  visit("slice_map", appearance.slice_map);
+  visit("slice_table", appearance.slice_table);
+  visit("slice_low", appearance.slice_low);
+  visit("slice_high", appearance.slice_high);
+}
+
 /// Calls visit(name, field) for each field of a request, its camera and its appearance, except
 /// on_pass. The names are those of isowave's Python package.
 ///
@@ -167,14 +291,11 @@ void for_each_field(Request &request, const Visit &visit) {
   visit("height", request.size.height);
   visit("samples", request.size.samples);
   visit("surface", request.appearance.surface);
-  visit("background", request.appearance.background);
-  visit("ambient", request.appearance.ambient);
-  visit("diffuse", request.appearance.diffuse);
-  visit("specular", request.appearance.specular);
-  visit("above", request.appearance.above);
-  visit("transparent", request.appearance.transparent);
+  for_each_appearance_field(request.appearance, visit);
   visit("clip", request.clip);
   visit("caps", request.caps);
+  visit("surfaces", request.surfaces);
+  visit("slices", request.slices);
   visit("voxel_pixels", request.voxel_pixels);
   visit("voxel_error", request.voxel_error);
   visit("bound", request.bound);
@@ -189,18 +310,29 @@ void for_each_field(Request &request, const Visit &visit) {
   visit("want_normals", request.want_normals);
   visit("want_positions", request.want_positions);
   visit("want_hits", request.want_hits);
+  visit("want_field", request.want_field);
   visit("want_bounds", request.want_bounds);
 }
 
 struct FrameStatistics {
   std::uint32_t passes = 0;
-  std::uint64_t rays = 0, hits = 0;
-  std::uint64_t decoded_blocks = 0;               ///< all decoded blocks of 4^3 voxels
-  std::uint32_t normals_passes = 0;               ///< those of `passes` for smooth normals
-  std::uint64_t normals_decoded_blocks = 0;       ///< those of decoded_blocks for smooth normals
-  double normals_ms = 0;                          ///< part of total_ms
-  std::uint32_t ambient_passes = 0;               ///< those of `passes` for ambient rays
-  double ambient_ms = 0;                          ///< part of total_ms
+  std::uint64_t rays = 0, hits = 0;  ///< hits: rays that hit a surface
+  // Frames with FrameRequest::surfaces; otherwise 0.
+  std::uint32_t layers = 0;      ///< most surface crossings that were drawn of any ray
+  std::uint64_t layer_hits = 0;  ///< all crossings that were drawn
+  std::uint64_t rays_cut = 0;    ///< rays with a seen crossing behind their 16th, which is left out
+  std::uint64_t decoded_blocks = 0;          ///< all decoded blocks of 4^3 voxels
+  std::uint32_t normals_passes = 0;          ///< those of `passes` for smooth normals
+  std::uint64_t normals_decoded_blocks = 0;  ///< those of decoded_blocks for smooth normals
+  double normals_ms = 0;                     ///< part of total_ms
+  std::uint32_t ambient_passes = 0;          ///< those of `passes` for ambient and shadow rays
+  double ambient_ms = 0;                     ///< part of total_ms
+  double field_ms = 0;                       ///< part of total_ms, for values of a field
+  /// The least and the largest value of the field at the hits; none: there is no value.
+  std::optional<std::array<float, 2>> field_range{};
+  /// The values of the first and the last colour: distances along Appearance::color_axis, or values
+  /// of the field. None: there is no colour map, or no value.
+  std::optional<std::array<double, 2>> color_range{};
   std::uint64_t uploaded_bytes = 0;               ///< from a compressed volume on the host
   std::uint32_t first_level = 0, last_level = 0;  ///< levels of detail that drew; 0: the finest
   /// Wall clock, from camera to the wanted arrays in the host's memory, without Frame::bounds.
@@ -232,7 +364,9 @@ struct DetailChoice {
 };
 
 /// A finished frame. Arrays that were not asked for are empty. Rays are [rows][columns], row 0 at
-/// the top: size.samples times as many as pixels along each axis.
+/// the top: size.samples times as many as pixels along each axis. With FrameRequest::surfaces,
+/// depth, normals, positions and hits are those of each ray's first crossing, however translucent
+/// that surface is.
 struct Frame {
   ImageSize size{};
   std::uint32_t rows = 0, columns = 0;  ///< numbers of rays
@@ -244,7 +378,8 @@ struct Frame {
                                           ///< larger values; 0 0 0: no hit
   /// [rows][columns] hits in world space, rounded if Volume::float32_positions(); NaN: no hit
   Array<Vector3> positions{};
-  Array<Hit> hits{};  ///< [rows][columns]
+  Array<float> field{};  ///< [rows][columns] values of the field; NaN: no hit, or no value
+  Array<Hit> hits{};     ///< [rows][columns]
   /// [rows][columns] Largest possible distance to the true surface along the ray [pixels];
   /// infinity: nothing is certain. Bounds hold if the volume's errors do: see
   /// FrameStatistics::errors_are_stated.

@@ -7,11 +7,13 @@
 //   isowave::Frame frame = renderer.render({.camera = renderer.camera(80), .isovalue = 80});
 //   isowave::Mesh mesh = isowave::extract(volume, 80);
 
+#include "isowave/annotations.hpp"
 #include "isowave/camera.hpp"
 #include "isowave/error.hpp"
 #include "isowave/frame.hpp"
 #include "isowave/host_renderer.hpp"
 #include "isowave/mesh.hpp"
 #include "isowave/renderer.hpp"
+#include "isowave/series.hpp"
 #include "isowave/version.hpp"
 #include "isowave/volume.hpp"

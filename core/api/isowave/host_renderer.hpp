@@ -15,7 +15,8 @@ struct HostRendererOptions {
   /// needs more blocks than the limit allows, blocks are decoded more than once.
   std::uint64_t memory_limit = 0;
   std::uint32_t num_threads = 0;  ///< 0: one per processor. The result is the same for any number
-  ImageSize largest{};            ///< picture for Renderer::camera(); frames may be larger
+  std::shared_ptr<const Volume> field{};  ///< as RendererOptions::field
+  ImageSize largest{};                    ///< picture for Renderer::camera(); frames may be larger
 };
 
 /// Makes a renderer that decodes the blocks that rays come to, and keeps them in host memory. It

@@ -15,3 +15,4 @@
 #include "isowave/make_renderer.hpp"
 #include "isowave/quick_renderer.hpp"
 #include "isowave/renderer.hpp"
+#include "isowave/scene.hpp"

@@ -28,6 +28,10 @@ struct RendererOptions {
   bool with_bounds = false;       ///< frames may ask for bounds and max_surface_error
   bool with_time_budget = false;  ///< frames may have a time budget
   bool with_rays = false;         ///< frames may have ambient rays, and cast_rays() may be called
+  /// Most FrameRequest::surfaces of a frame, 0 to 8. On a device, each takes 36 bytes a ray.
+  std::uint32_t with_surfaces = 0;
+  /// A second volume for Appearance::color_by_field, of any grid. It gets up to half the memory.
+  std::shared_ptr<const Volume> field{};
 };
 
 /// Turns requests into pictures of one volume. The constructor makes a renderer that draws on a
@@ -64,6 +68,15 @@ class Renderer {
   /// A view from the front right and above in which the isosurface fills a picture of that size
   /// (none: of the largest size). If there is no surface, the volume fills the picture.
   Camera camera(double isovalue, std::optional<ImageSize> size = {});
+  /// The same for all surfaces of a frame together.
+  Camera camera(const std::vector<Surface> &surfaces, std::optional<ImageSize> size = {});
+  /// Views once around the surfaces, about the world axis +y, from so far that the surfaces are in
+  /// all pictures. The first view is from where camera() looks, and each is turned on by 360 /
+  /// num_views degrees.
+  ///
+  /// Throws  Error: num_views is not 1 to 100,000
+  std::vector<Camera> turntable(const std::vector<Surface> &surfaces, std::uint32_t num_views,
+                                std::optional<ImageSize> size = {});
 
   /// Whether the renderer was made for such requests.
   bool can_draw(const FrameRequest &request) const;

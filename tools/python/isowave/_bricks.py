@@ -12,13 +12,14 @@ import numpy as np
 import numpy.typing as npt
 
 from isowave import _core
-from isowave._camera import Camera
+from isowave._camera import Camera, view_count
 from isowave._checked import Isovalue, number, size_of
 from isowave._compress import compression_options
 from isowave._image import Image
 from isowave._placed import Placed
 from isowave._renderer import draw, renderer_options, warn_of_isovalue
-from isowave._request import Request
+from isowave._request import Request, isovalue_or_surfaces
+from isowave._surface import Surface, surfaces_of
 
 OUTPUTS = ("rgb", "depth", "normals")
 ALL_OUTPUTS = (*OUTPUTS, "bounds")
@@ -90,7 +91,7 @@ class BrickRenderer(Placed[_core.Renderer]):
         files it reads its layers, and compresses its brick.
     comm
         A communicator of mpi4py, e.g. MPI.COMM_WORLD. The processes of a machine share its devices.
-    device, size, samples, memory_budget, cache_blocks, rays
+    device, size, samples, memory_budget, cache_blocks, rays, surfaces
         As Renderer's, for each process, which needs an OpenCL device. Several devices, with commas,
         are taken in turn.
     levels
@@ -123,6 +124,7 @@ class BrickRenderer(Placed[_core.Renderer]):
         levels: bool = False,
         bounds: bool = False,
         rays: bool = False,
+        surfaces: int = 0,
         bricks: tuple[int, int, int] | None = None,
         tolerance: float | None = None,
         relative_tolerance: float | None = None,
@@ -139,7 +141,9 @@ class BrickRenderer(Placed[_core.Renderer]):
             )
             compression["measure_error"] = False
             can = {"levels": levels, "bounds": bounds, "rays": rays}
-            options = renderer_options(size, samples, memory_budget, cache_blocks, **can)
+            options = renderer_options(
+                size, samples, memory_budget, cache_blocks, surfaces=surfaces, **can
+            )
             options["device"] = "" if device is None else str(device)
             options["bricks"] = None if bricks is None else "{}x{}x{}".format(*bricks)
             return compression, options
@@ -156,19 +160,43 @@ class BrickRenderer(Placed[_core.Renderer]):
         """This process's device, as Renderer.device."""
         return self._core.device
 
-    def camera(self, isovalue: float, size: tuple[int, int] | None = None) -> Camera:
+    def camera(
+        self,
+        isovalue: float | None = None,
+        size: tuple[int, int] | None = None,
+        *,
+        surfaces: Sequence[Surface] = (),
+    ) -> Camera:
         """As Renderer.camera()."""
-        value, (width, height) = self._processes.together(
-            lambda: (given_isovalue(isovalue), self.size if size is None else size_of(size))
-        )
-        return Camera(*self._core.camera(value, width, height))
+        return self.turntable(1, isovalue, size, surfaces=surfaces)[0]
+
+    def turntable(
+        self,
+        num_views: int,
+        isovalue: float | None = None,
+        size: tuple[int, int] | None = None,
+        *,
+        surfaces: Sequence[Surface] = (),
+    ) -> list[Camera]:
+        """As Renderer.turntable()."""
+
+        def ask() -> tuple[list[float], int, tuple[int, int]]:
+            value = given_isovalue(isovalue_or_surfaces(isovalue, surfaces))
+            wanted = [each.isovalue for each in surfaces_of(surfaces)] or [value]
+            count = view_count(num_views)
+            return wanted, count, self.size if size is None else size_of(size)
+
+        isovalues, count, (width, height) = self._processes.together(ask)
+        cameras = self._core.turntable(isovalues, count, width, height)
+        return [Camera(*camera) for camera in cameras]
 
     def render(
         self,
-        isovalue: float,
+        isovalue: float | None = None,
         *,
         camera: Camera | None = None,
         size: tuple[int, int] | None = None,
+        surfaces: Sequence[Surface] = (),
         outputs: Sequence[str] = OUTPUTS,
         **more: Any,
     ) -> Image | None:
@@ -192,14 +220,16 @@ class BrickRenderer(Placed[_core.Renderer]):
 
         def ask() -> Request:
             request = Request(
-                given_isovalue(isovalue),
+                given_isovalue(isovalue_or_surfaces(isovalue, surfaces)),
                 camera,
                 self.size if size is None else size,
+                surfaces=surfaces,
                 outputs=outputs,
                 **more,
             )
-            if "position" in request.outputs:
-                raise ValueError(f"outputs position: bricks have {', '.join(ALL_OUTPUTS)}")
+            for name in request.outputs:
+                if name not in ALL_OUTPUTS:
+                    raise ValueError(f"outputs {name}: bricks have {', '.join(ALL_OUTPUTS)}")
             for name in ("time_budget", "on_pass"):
                 if getattr(request, name) is not None:
                     raise TypeError(f"a BrickRenderer draws without {name}")
@@ -209,9 +239,12 @@ class BrickRenderer(Placed[_core.Renderer]):
         if len(set(self._processes.all_gather(b"" if camera is None else b"given"))) > 1:
             raise _core.Error("some processes give a camera, and others none: ask alike")
         if camera is None:
-            request = replace(request, camera=self.camera(request.isovalue, request.size))
+            wanted = None if request.surfaces else request.isovalue
+            view = self.camera(wanted, request.size, surfaces=request.surfaces)
+            request = replace(request, camera=view)
         frame = draw(self._core, request, interrupts=False)
         if self._processes.rank != 0:
             return None
-        warn_of_isovalue(self._core, request.isovalue)
+        for value in request.isovalues:
+            warn_of_isovalue(self._core, value)
         return Image(frame, request)

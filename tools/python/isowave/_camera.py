@@ -67,6 +67,13 @@ class Camera:
         )
 
 
+def view_count(count: Any) -> int:
+    """How many views a turntable has: 1 to 100,000."""
+    if not 1 <= whole("num_views", count) <= 100_000:
+        raise ValueError(f"num_views={count}: give 1 to 100,000")
+    return int(count)
+
+
 def vector(values: Any) -> tuple[float, float, float]:
     x, y, z = (float(value) for value in values)
     return x, y, z

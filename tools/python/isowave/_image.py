@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -34,6 +35,12 @@ class Image:
     nothing is certain. Bounds hold if the volume's errors do, which a file may state wrongly:
     `statistics["errors_are_stated"]`, as `Volume.errors_are_stated`."""
 
+    field: npt.NDArray[np.float32] | None
+    """(rows, columns): values of the renderer's field at the hits; nan: none."""
+    surface: npt.NDArray[np.int8] | None
+    """(rows, columns): the index of the surface in `surfaces`, 0 without them; -1: no surface."""
+    cap: npt.NDArray[np.bool_] | None  #: (rows, columns): on a clipping plane
+
     def __init__(self, frame: dict[str, Any], request: Request) -> None:
         assert request.camera is not None
         # (height, width, 3), or 4 if it is transparent
@@ -42,12 +49,19 @@ class Image:
         self.normals = frame.get("normals")
         self.position = frame.get("positions")
         self.bounds = frame.get("bounds")
+        self.field = frame.get("field")
+        hits = set(request.outputs) if "surfaces" in frame else set()
+        self.surface = frame["surfaces"] if "surface" in hits else None
+        self.cap = frame["caps"].astype(bool) if "cap" in hits else None
         #: Counts and times of the frame: passes, rays, hits, decoded_blocks, total_ms and so on.
         self.statistics: dict[str, Any] = frame["statistics"]
         self.camera = request.camera
-        self.isovalue = request.isovalue
+        self.isovalue = request.isovalue  #: the first surface's
+        self.surfaces = tuple(request.surfaces)  #: with their colours; (): the isovalue's, opaque
         self._samples = request.samples
         self._background = WHITE if request.background is None else request.background
+        self._background_top = request.background_top
+        self._fields = request.for_core()
 
     @property
     def complete(self) -> bool:
@@ -61,15 +75,17 @@ class Image:
 
     @property
     def rgba(self) -> npt.NDArray[np.uint8]:
-        """(height, width, 4); alpha is the part of a pixel that the surface covers.
+        """(height, width, 4); alpha is the share of a pixel's rays that hit (straight alpha).
 
+        Rays that go on behind translucent surfaces count as far as these hide what is behind.
         Colours are the surface's, without the background. A transparent picture has been drawn
-        like this. Others become so if they have depth; without depth, all pixels are opaque.
+        like this. Others become so if they have depth and their surfaces are opaque; otherwise all
+        pixels are.
         """
         rgb = self._drawn()
         if rgb.shape[2] == 4:
             return rgb
-        if self.depth is None:
+        if self.depth is None or any(each.opacity < 1 for each in self.surfaces):
             return np.dstack((rgb, np.full(rgb.shape[:2], 255, np.uint8)))
         s = self._samples
         hit = np.isfinite(self.depth).reshape(rgb.shape[0], s, rgb.shape[1], s)
@@ -77,10 +93,52 @@ class Image:
         edge = (covered > 0) & (covered < 1)
         if edge.any():  # there, rays that met nothing have mixed the background in
             part = covered[edge][:, None]
-            surface = (rgb[edge] - (1 - part) * 255 * np.array(self._background)) / part
+            behind = np.broadcast_to(self._background_rows(len(rgb))[:, None], rgb.shape)
+            surface = (rgb[edge] - (1 - part) * 255 * behind[edge]) / part
             rgb = rgb.copy()
             rgb[edge] = np.rint(surface.clip(0, 255))
         return np.dstack((rgb, np.rint(255 * covered).astype(np.uint8)))
+
+    def annotated(
+        self, what: str | Sequence[str] = "all", *, units: str = "", title: str = ""
+    ) -> npt.NDArray[np.uint8]:
+        """A copy of the picture with a scale bar and more, (height, width, 3), or 4 with alpha.
+
+        The arrays of the image stay as they are. Needs Pillow: pip install 'isowave[annotations]'.
+
+        Parameters
+        ----------
+        what
+            "scale-bar": a round length at the depth of the point that the camera looks at; "axes":
+            directions of x, y and z; "color-bar" of the colour map; "caption": title, isovalues and
+            their colours; "all" of them, or a list of these names.
+        units
+            Units of the world, such as "mm": for the scale bar, and for colours along an axis.
+        title
+            First line of the caption, such as the name of the volume's file.
+
+        Raises
+        ------
+        Error
+            The picture has less than 200 x 150 pixels; a colour bar without a colour map.
+        """
+        from isowave._annotate import annotations_of, draw
+
+        wanted = annotations_of(
+            what,
+            units,
+            title,
+            bool(self._fields.get("color_map") or self._fields.get("color_table")),
+        )
+        groups = _core.annotation_layout(wanted, self._fields, self.statistics.get("color_range"))
+        return draw(self._drawn(), groups)
+
+    def _background_rows(self, rows: int) -> npt.NDArray[np.float64]:
+        """(rows, 3): the background at each row, from the top."""
+        bottom = np.array(self._background, np.float64)
+        top = bottom if self._background_top is None else np.array(self._background_top, np.float64)
+        up = 1 - (np.arange(rows)[:, None] + 0.5) / rows
+        return bottom + up * (top - bottom)
 
     def _drawn(self) -> npt.NDArray[np.uint8]:
         if self._picture is None:
@@ -107,4 +165,6 @@ class Image:
         shown = ""
         if self._picture is not None:
             shown = f"{self._picture.shape[1]} x {self._picture.shape[0]}, "
-        return f"<isowave.Image {shown}isovalue {self.isovalue:g}>"
+        isovalues = [each.isovalue for each in self.surfaces] or [self.isovalue]
+        plural = "s" if len(isovalues) > 1 else ""
+        return f"<isowave.Image {shown}isovalue{plural} {', '.join(f'{v:g}' for v in isovalues)}>"

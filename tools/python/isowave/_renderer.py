@@ -7,7 +7,7 @@ import queue
 import sys
 import threading
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -15,15 +15,27 @@ import numpy as np
 import numpy.typing as npt
 
 from isowave import _core
-from isowave._camera import Camera
+from isowave._camera import Camera, view_count
 from isowave._checked import Isovalue, flag, refuse, size_of, whole
 from isowave._clip import ClipPlane
+from isowave._color_map import ColorMap
 from isowave._image import Image
 from isowave._levels import Voxels
-from isowave._request import ALL_OUTPUTS, Color, Progress, Request, normals_of
+from isowave._request import ALL_OUTPUTS, Progress, Request, isovalue_or_surfaces, normals_of
+from isowave._slice import Slice
+from isowave._surface import MAX_SURFACES, Color, Surface
 
-#: Arguments of Renderer that allow more requests.
-CAPABILITIES = ("levels", "bounds", "time_budget", "rays")
+#: Arguments of Renderer that allow more requests, and their defaults.
+CAPABILITIES: dict[str, int] = {
+    "levels": False,
+    "bounds": False,
+    "time_budget": False,
+    "rays": False,
+    "surfaces": 0,
+}
+
+
+ON_HOST: dict[str, int] = {**dict.fromkeys(CAPABILITIES, True), "surfaces": MAX_SURFACES}
 
 
 def renderer_options(
@@ -31,6 +43,8 @@ def renderer_options(
     samples: int,
     memory_budget: int | None,
     cache_blocks: int,
+    *,
+    surfaces: int = 0,
     **capabilities: bool,
 ) -> dict[str, Any]:
     """Arguments of Renderer as isowave::RendererOptions, checked."""
@@ -44,6 +58,7 @@ def renderer_options(
         ),
         "cache_blocks": whole("cache_blocks", cache_blocks),
         **{f"with_{name}": flag(name, value) for name, value in capabilities.items()},
+        "with_surfaces": whole("surfaces", surfaces, MAX_SURFACES),
     }
 
 
@@ -104,6 +119,11 @@ class Renderer:
     levels, bounds, time_budget, rays
         Whether frames may use levels of detail; ask for `max_error` and bounds; have a
         `time_budget`; have `ambient` rays, and cast_rays() may be called. On the host they may.
+    surfaces
+        How many `surfaces` frames may have, up to 8. Frames of the host may have 8.
+    field
+        A second volume, of any grid, that ColorMap(by="field") colours surfaces by. It is read at
+        its finest level, and takes up to half the memory.
     profiling
         Measures a device's stages, for statistics["stage_ms"]. The host then waits for each pass.
     quick
@@ -127,26 +147,36 @@ class Renderer:
         bounds: bool = False,
         time_budget: bool = False,
         rays: bool = False,
+        surfaces: int = 0,
+        field: Voxels | None = None,
         profiling: bool = False,
         quick: bool = False,
     ) -> None:
         can = {"levels": levels, "bounds": bounds, "time_budget": time_budget, "rays": rays}
-        options = renderer_options(size, samples, memory_budget, cache_blocks, **can)
+        options = renderer_options(
+            size, samples, memory_budget, cache_blocks, surfaces=surfaces, **can
+        )
         options |= {"profiling": flag("profiling", profiling), "quick": flag("quick", quick)}
+        if field is not None and not isinstance(getattr(field, "_core", None), _core.Volume):
+            raise refuse("field", field, "an isowave.Volume")
+        options["field"] = None if field is None else field._core
         name = "" if device is None else str(device)
-        self._hold(volume, _core.make_renderer(name, volume._core, options), size_of(size), can)
+        core = _core.make_renderer(name, volume._core, options)
+        self._hold(volume, core, size_of(size), {**can, "surfaces": surfaces})
+        self._has_field = field is not None
         if not self._on_host:
             self.max_rays = self.size[0] * self.size[1] * options["samples"] ** 2
         if notice := self._core.device["notice"]:
             warnings.warn(notice, RuntimeWarning, stacklevel=2)
 
     def _hold(
-        self, volume: Voxels, core: _core.Renderer, size: tuple[int, int], can: dict[str, bool]
+        self, volume: Voxels, core: _core.Renderer, size: tuple[int, int], can: dict[str, int]
     ) -> None:
         """can: what a device's frames may ask for, by the arguments of the constructor."""
         self.volume, self.size = volume, size
+        self._has_field = False
         self._core, self._on_host = core, not core.device["name"]
-        self._can = dict.fromkeys(can, True) if self._on_host else can
+        self._can: dict[str, int] = ON_HOST if self._on_host else can
         self.max_rays = math.inf
         self._iterating: int | None = None  # the thread that looks at a picture of passes()
 
@@ -171,11 +201,37 @@ class Renderer:
         """Waits until the device draws. Raises Error if its renderer cannot be made."""
         self._core.wait()
 
-    def camera(self, isovalue: Isovalue, size: tuple[int, int] | None = None) -> Camera:
-        """A view from the front right and above in which the isosurface fills the picture."""
+    def camera(
+        self,
+        isovalue: Isovalue | None = None,
+        size: tuple[int, int] | None = None,
+        *,
+        surfaces: Sequence[Surface] = (),
+    ) -> Camera:
+        """A view from the front right and above in which the surfaces fill the picture."""
+        value = self.volume._isovalue(isovalue_or_surfaces(isovalue, surfaces))
+        isovalues = Request(value, surfaces=surfaces).isovalues
+        return self._camera(isovalues, self.size if size is None else size_of(size))
+
+    def turntable(
+        self,
+        num_views: int,
+        isovalue: Isovalue | None = None,
+        size: tuple[int, int] | None = None,
+        *,
+        surfaces: Sequence[Surface] = (),
+    ) -> list[Camera]:
+        """Views once around the surfaces, as Volume.turntable()."""
+        value = self.volume._isovalue(isovalue_or_surfaces(isovalue, surfaces))
+        isovalues = Request(value, surfaces=surfaces).isovalues
+        width, height = self.size if size is None else size_of(size)
         self._check_turn()
-        picture_size = self.size if size is None else size_of(size)
-        return Camera(*self._core.camera(self.volume._isovalue(isovalue), *picture_size))
+        count = view_count(num_views)
+        return [Camera(*camera) for camera in self._core.turntable(isovalues, count, width, height)]
+
+    def _camera(self, isovalues: list[float], size: tuple[int, int]) -> Camera:
+        self._check_turn()
+        return Camera(*self._core.camera(isovalues, *size))
 
     def _check_turn(self) -> None:
         """Raises Error in the loop over passes(), whose frame keeps the renderer until it ends."""
@@ -184,17 +240,26 @@ class Renderer:
 
     def render(
         self,
-        isovalue: Isovalue,
+        isovalue: Isovalue | None = None,
         *,
         camera: Camera | None = None,
         size: tuple[int, int] | None = None,
         samples: int = 1,
         color: Color | None = None,
+        color_map: ColorMap | str | None = None,
         background: Color | None = None,
+        background_top: Color | None = None,
+        lights: Mapping[str, float] | None = None,
+        light: Sequence[float] | None = None,
+        shadow_rays: int = 0,
+        light_angle: float = 3.0,
         transparent: bool = False,
         normals: str = "smooth",
         clip: Sequence[ClipPlane] = (),
         caps: bool = True,
+        surfaces: Sequence[Surface] = (),
+        slices: Sequence[Slice] = (),
+        slice_map: ColorMap | str = "gray",
         outputs: Sequence[str] = ALL_OUTPUTS,
         max_error: float | None = None,
         by: str = "proof",
@@ -210,42 +275,57 @@ class Renderer:
         Parameters
         ----------
         isovalue
-            The surface is where the trilinear field crosses this value. "auto": the first of
-            Volume.suggested_isovalues().
+            Value of the field on the surface. "auto": the first of Volume.suggested_isovalues().
         camera
             None: the surface fills the picture.
         size
             Width and height [pixels]; None: the renderer's largest.
         samples
             Rays per pixel along each axis, 1 to 8; colours are their mean.
-        color, background
-            Colours of the surface and behind it: "#rrggbb", or red, green, blue from 0 to 1.
+        color, background, color_map
+            Colours of surface and background: "#rrggbb", a name as "bone", or three numbers 0 to 1.
+            A ColorMap colours surfaces by the distance along an axis, or by the renderer's field.
+        background_top
+            The background goes linearly from `background` at the lower edge to this colour at the
+            upper; None: it is uniform.
+        lights
+            Other weights than {"ambient": 0.15, "diffuse": 0.5, "specular": 0.2, "above": 0.45}.
+        light
+            Direction (x, y, z) towards a light of the scene, in world space. It comes instead of
+            the light "above", which turns with the camera, with its weight.
+        shadow_rays, light_angle
+            Rays from each hit towards that light, up to 255: 1 gives hard shadows, 16 and more soft
+            ones, of a light with half that angle [degrees, up to 45]. Each takes about as long as a
+            frame without any. Needs rays=True; not with surfaces.
         transparent
-            Draws `rgba` instead of `rgb`, without a background. Alpha is the share of a pixel's
-            rays that hit, and the colour is theirs (straight alpha).
+            Draws `rgba` instead of `rgb`, without a background: see Image.rgba.
         normals
             "smooth": central differences; "cell": gradients of cells, which jump between them.
-        clip
+        clip, caps
             Up to 14 clipping planes, see ClipPlane and clip_box(): what is in all of their half
-            spaces is drawn. A `max_error` by proof and the output "bounds" need whole surfaces.
-        caps
-            Draws flat caps where planes cut what is inside the surface: values above the isovalue.
-            Otherwise cuts are open, and show the surface from within.
+            spaces is drawn. Flat caps close cuts through what is inside the surface, or cuts are
+            open. A `max_error` by proof and the output "bounds" need whole surfaces.
+        surfaces
+            Up to 8 surfaces in one picture, instead of `isovalue` and `color`: see Surface. Needs
+            surfaces= of the constructor; not with max_error, voxel_pixels, time_budget, ambient.
+        slices, slice_map
+            Planes that show the voxels beside the surfaces, see Slice: up to 8 with them, with
+            their conditions. A ColorMap gives colours and range [the volume's]; the rest of it is
+            not used.
         outputs
-            Names of the arrays to bring back: "rgb", "depth", "normals", "position", "bounds".
+            Arrays of Image: "rgb", "depth", "normals", "position", "bounds", "surface", "cap",
+            "field".
         max_error
-            Largest distance between drawn and true surface [pixels], that the detail must keep.
+            Largest distance between drawn and true surface [pixels], that the detail must keep: see
+            statistics["detail"].
         by
             "proof" of max_error, against the volume before compression, which needs bounds=True; or
-            "sample": 99 % of the hits keep it, against full detail, as some rays show. Needs
-            levels=True; see statistics["detail"].
+            "sample": 99 % of the hits keep it, against full detail. Needs levels=True.
         series
-            Views that share max_error, such as those of a movie: most hits of all of them together
-            keep it. Frames with the same series have one detail, which is chosen once.
-        voxel_pixels
-            Largest distance between voxels of coarser levels [pixels]; 0: none. Needs levels=True.
-        voxel_error
-            Largest difference of decoded voxels from the compressed ones [voxel values].
+            Views, as of a movie, that share max_error: most hits of all of them together keep it.
+        voxel_pixels, voxel_error
+            Largest distance between voxels of coarser levels [pixels], which needs levels=True, and
+            largest difference of decoded voxels from the compressed ones [voxel values]; 0: none.
         time_budget
             Draws the best picture possible in so many seconds. Needs time_budget=True.
         ambient
@@ -260,7 +340,7 @@ class Renderer:
             A request that the renderer was not made for, in one line. Later frames can be drawn.
         """
         arguments = {name: value for name, value in locals().items() if name != "self"}
-        arguments["isovalue"] = self.volume._isovalue(isovalue)
+        arguments["isovalue"] = self.volume._isovalue(isovalue_or_surfaces(isovalue, surfaces))
         return self.draw(Request(**arguments))
 
     def draw(self, request: Request) -> Image:
@@ -269,11 +349,18 @@ class Renderer:
         for option, argument in request.needs.items():
             if not self._can[option]:
                 raise _core.Error(f"{argument} needs a renderer that was made with {option}=True")
+        if request.needs_field and not self._has_field:
+            raise _core.Error("values of a field need a renderer that was made with field=VOLUME")
+        needed = request.num_surfaces
+        if needed > self._can["surfaces"]:
+            asked = "surfaces" if request.surfaces else "slices"
+            raise _core.Error(f"{asked} needs a renderer that was made with surfaces={needed}")
         request = self._completed(request)
         # On a GPU, frames end before a person can press Ctrl-C, and looking for Ctrl-C after each
         # pass would cost time.
         interrupts = self.device["type"] != "gpu"
-        warn_of_isovalue(self._core, request.isovalue)
+        for isovalue in request.isovalues:
+            warn_of_isovalue(self._core, isovalue)
         frame = draw(self._core, request, interrupts)
         if "positions" in frame:
             frame["positions"] = positions_of(self.volume, frame["positions"])
@@ -281,7 +368,7 @@ class Renderer:
 
     def _completed(self, request: Request) -> Request:
         size = request.size or self.size
-        camera = request.camera or self.camera(request.isovalue, size)
+        camera = request.camera or self._camera(request.isovalues, size)
         return replace(request, size=size, camera=camera)
 
     def cast_rays(
@@ -313,7 +400,7 @@ class Renderer:
         state = "" if self.ready else ", not ready"
         return f"<isowave.Renderer {width} x {height}, {self.device['name'] or 'host'}{state}>"
 
-    def passes(self, isovalue: Isovalue, **more: Any) -> Iterator[Image]:
+    def passes(self, isovalue: Isovalue | None = None, **more: Any) -> Iterator[Image]:
         """Yields the picture after each pass, and the finished one last; arguments as render().
 
         Pictures before the last have only rgb, or rgba. The frame waits until the next picture is
@@ -346,7 +433,7 @@ class Renderer:
                 put(error)
             put(None)
 
-        value = self.volume._isovalue(isovalue)
+        value = self.volume._isovalue(isovalue_or_surfaces(isovalue, more.get("surfaces", ())))
         request = self._completed(Request(value, on_pass=on_pass, **more))
         thread = threading.Thread(target=draw, name="isowave passes", daemon=True)
         thread.start()
@@ -377,6 +464,5 @@ def host_renderer(volume: Voxels) -> Renderer:
         The memory is not enough.
     """
     renderer = Renderer.__new__(Renderer)
-    can = dict.fromkeys(CAPABILITIES, True)
-    renderer._hold(volume, _core.host_renderer(volume._core, 0), (1280, 720), can)
+    renderer._hold(volume, _core.host_renderer(volume._core, 0), (1280, 720), ON_HOST)
     return renderer

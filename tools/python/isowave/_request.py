@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,12 +11,26 @@ import numpy.typing as npt
 
 from isowave import _core
 from isowave._camera import Camera, vector
-from isowave._checked import flag, function, names, number, numbers, refuse, size_of, whole
+from isowave._checked import (
+    Isovalue,
+    flag,
+    function,
+    names,
+    number,
+    numbers,
+    refuse,
+    size_of,
+    whole,
+)
 from isowave._clip import ClipPlane, clip_of
+from isowave._color_map import CheckedColorMap, ColorMap, color_map_for_core, color_map_of
+from isowave._slice import Slice, slice_map_for_core, slice_map_of, slices_of
+from isowave._surface import MAX_SURFACES, Color, Surface, color_of, surfaces_of
 
-Color = str | Sequence[float]  # "#rrggbb", or red, green, blue from 0 to 1
 ALL_OUTPUTS = ("rgb", "depth", "normals", "position")
-KNOWN_OUTPUTS = (*ALL_OUTPUTS, "bounds")
+#: Weights of lights: from all around; of a headlight at the eye, and its highlight; from above it.
+LIGHTS = ("ambient", "diffuse", "specular", "above")
+KNOWN_OUTPUTS = (*ALL_OUTPUTS, "bounds", "surface", "cap", "field")
 
 
 def rgb_of(picture: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
@@ -60,6 +73,8 @@ class Progress:
 class Request:
     """A request of a frame: the arguments of Renderer.render(), which describes them.
 
+    With surfaces, the isovalue becomes that of the first one.
+
     Raises
     ------
     TypeError, ValueError
@@ -72,11 +87,20 @@ class Request:
     size: tuple[int, int] | None = None
     samples: int = 1
     color: Color | None = None
+    color_map: ColorMap | CheckedColorMap | str | None = None
     background: Color | None = None
+    background_top: Color | None = None
+    lights: Mapping[str, float] | None = None
+    light: Sequence[float] | None = None
+    shadow_rays: int = 0
+    light_angle: float = 3.0
     transparent: bool = False
     normals: str = "smooth"
     clip: Sequence[ClipPlane] = ()
     caps: bool = True
+    surfaces: Sequence[Surface] = ()
+    slices: Sequence[Slice] = ()
+    slice_map: ColorMap | CheckedColorMap | str = "gray"
     outputs: Sequence[str] = ALL_OUTPUTS
     max_error: float | None = None
     by: str = "proof"
@@ -94,16 +118,24 @@ class Request:
             listed = ", ".join(sorted(unknown))
             raise ValueError(f"outputs {listed}: there are {', '.join(KNOWN_OUTPUTS)}")
         checked = {
-            "isovalue": number("isovalue", self.isovalue),
             "camera": None if self.camera is None else camera_of(self.camera),
             "size": None if self.size is None else size_of(self.size),
             "samples": whole("samples", self.samples),
-            "color": None if self.color is None else color_of(self.color),
-            "background": None if self.background is None else color_of(self.background),
+            "color": optional_color(self.color),
+            "color_map": color_map_of(self.color_map),
+            "background": optional_color(self.background),
+            "background_top": optional_color(self.background_top),
+            "lights": lights_of(self.lights),
+            "light": None if self.light is None else vector(numbers("light", self.light, 3)),
+            "shadow_rays": whole("shadow_rays", self.shadow_rays),
+            "light_angle": number("light_angle", self.light_angle),
             "transparent": flag("transparent", self.transparent),
             "normals": normals_of(self.normals),
             "clip": clip_of(self.clip),
             "caps": flag("caps", self.caps),
+            "surfaces": surfaces_of(self.surfaces),
+            "slices": slices_of(self.slices),
+            "slice_map": slice_map_of(self.slice_map),
             "outputs": outputs,
             "max_error": optional("max_error", self.max_error),
             "by": evidence_of(self.by),
@@ -114,10 +146,41 @@ class Request:
             "ambient": whole("ambient", self.ambient),
             "on_pass": function("on_pass", self.on_pass),
         }
-        if self.transparent and self.background is not None:
-            raise ValueError("background: a transparent picture has none")
+        surfaces = checked["surfaces"]
+        if surfaces and self.color is not None:
+            raise ValueError("color: surfaces have colours of their own")
+        by_field = checked["color_map"] is not None and checked["color_map"].by != "axis"
+        if self.color_map is not None and self.color is not None and not by_field:
+            raise ValueError("color: the colour map colours surfaces")
+        value = number("isovalue", surfaces[0].isovalue if surfaces else self.isovalue)
+        object.__setattr__(self, "isovalue", value)
+        for name in ("background", "background_top"):
+            if self.transparent and checked[name] is not None:
+                raise ValueError(f"{name}: a transparent picture has none")
         for name, value in checked.items():
             object.__setattr__(self, name, value)
+
+    @property
+    def isovalues(self) -> list[float]:
+        """Those of all surfaces."""
+        return [surface.isovalue for surface in self.surfaces] or [self.isovalue]
+
+    @property
+    def num_surfaces(self) -> int:
+        """Surfaces that a renderer must be made for; slices need those for one."""
+        return min(max(len(self.surfaces), 1 if self.slices else 0), MAX_SURFACES)
+
+    @property
+    def needs_field(self) -> bool:
+        """Whether a renderer needs a field to draw this."""
+        color_map = color_map_of(self.color_map)
+        return "field" in self.outputs or (color_map is not None and color_map.by != "axis")
+
+    @property
+    def shows_caps(self) -> bool:
+        """Whether caps show a field."""
+        color_map = color_map_of(self.color_map)
+        return color_map is not None and color_map.by == "caps"
 
     @property
     def needs(self) -> dict[str, str]:
@@ -131,7 +194,10 @@ class Request:
                 by_sample or self.voxel_pixels > 0,
             ),
             "time_budget": ("time_budget", self.time_budget is not None),
-            "rays": ("ambient", self.ambient != 0),
+            "rays": (
+                "ambient" if self.ambient else "shadow_rays",
+                self.ambient != 0 or self.shadow_rays != 0,
+            ),
         }
         return {option: argument for option, (argument, is_asked) in asked.items() if is_asked}
 
@@ -145,11 +211,20 @@ class Request:
             "height": self.size[1],
             "samples": self.samples,
             "surface": self.color,
+            **color_map_for_core(color_map_of(self.color_map)),
             "background": self.background,
+            "background_top": self.background_top,
+            **lights_of(self.lights),
+            "light_direction": self.light,
+            "shadow_rays": self.shadow_rays,
+            "light_angle": self.light_angle,
             "transparent": self.transparent,
             "normals": self.normals,
             "clip": [{"normal": plane.normal, "offset": plane.offset} for plane in self.clip],
             "caps": self.caps,
+            "surfaces": [vars(each) for each in self.surfaces],
+            "slices": [vars(each) for each in self.slices],
+            **slice_map_for_core(slice_map_of(self.slice_map)),
             "voxel_pixels": self.voxel_pixels,
             "voxel_error": self.voxel_error,
             "max_surface_error": self.max_error,
@@ -161,20 +236,19 @@ class Request:
             "want_depth": "depth" in self.outputs,
             "want_normals": "normals" in self.outputs,
             "want_positions": "position" in self.outputs,
+            "want_field": "field" in self.outputs,
+            "want_hits": not {"surface", "cap"}.isdisjoint(self.outputs),
             "want_bounds": "bounds" in self.outputs,
         }
 
 
-def color_of(color: Color) -> tuple[float, float, float]:
-    if isinstance(color, str):
-        digits = re.fullmatch("#([0-9a-fA-F]{2})([0-9a-fA-F]{2})([0-9a-fA-F]{2})", color)
-        if not digits:
-            raise ValueError(f"color {color!r}: give '#rrggbb', or red, green, blue from 0 to 1")
-        return vector(int(part, 16) / 255 for part in digits.groups())
-    color = numbers("color", color, 3)
-    if not all(0 <= part <= 1 for part in color):
-        raise ValueError(f"color {tuple(color)}: give red, green and blue, from 0 to 1")
-    return vector(color)
+def isovalue_or_surfaces(isovalue: Isovalue | None, surfaces: Sequence[Surface]) -> Isovalue:
+    """The isovalue; 0 with surfaces, whose first one has it. Raises TypeError: both, or none."""
+    if isovalue is not None and surfaces:
+        raise TypeError("isovalue and surfaces: give one of both")
+    if isovalue is None and not surfaces:
+        raise TypeError("give an isovalue, or surfaces")
+    return 0.0 if isovalue is None else isovalue
 
 
 def camera_of(camera: Any) -> Camera:
@@ -206,6 +280,18 @@ def camera_for_core(camera: Camera) -> dict[str, Any]:
     }
 
 
+def lights_of(lights: Any) -> dict[str, float]:
+    if lights is None:
+        return {}
+    if not isinstance(lights, Mapping):
+        raise refuse("lights", lights, "a dict")
+    unknown = {*lights} - {*LIGHTS}
+    if unknown:
+        listed = ", ".join(sorted(map(str, unknown)))
+        raise ValueError(f"lights {listed}: there are {', '.join(LIGHTS)}")
+    return {name: number(f"lights[{name!r}]", value) for name, value in lights.items()}
+
+
 def normals_of(normals: str) -> str:
     if normals not in ("smooth", "cell"):
         raise ValueError(f"normals {normals!r}: give 'smooth' or 'cell'")
@@ -216,6 +302,10 @@ def evidence_of(by: str) -> str:
     if by not in ("proof", "sample"):
         raise ValueError(f"by {by!r}: give 'proof' or 'sample'")
     return by
+
+
+def optional_color(color: Color | None) -> Any:
+    return None if color is None else color_of(color)
 
 
 def optional(name: str, value: Any) -> float | None:

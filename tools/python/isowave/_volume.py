@@ -7,7 +7,7 @@ import pathlib
 import tempfile
 import threading
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -28,7 +28,9 @@ from isowave._renderer import (
     positions_of,
     warn_of_isovalue,
 )
-from isowave._request import Request
+from isowave._request import Request, isovalue_or_surfaces
+from isowave._scene import Scene
+from isowave._surface import Surface
 
 
 class Turns:
@@ -96,26 +98,52 @@ class Volume(Voxels):
 
     def camera(
         self,
-        isovalue: Isovalue,
+        isovalue: Isovalue | None = None,
         *,
         size: tuple[int, int] = (1280, 720),
+        surfaces: Sequence[Surface] = (),
         device: str | int | None = None,
     ) -> Camera:
-        """A view from the front right and above in which the isosurface fills the picture."""
+        """A view from the front right and above in which the surfaces fill the picture."""
         with self._lock:
-            return self._renderer_for({"device": device}).camera(isovalue, size)
+            renderer = self._renderer_for({"device": device})
+            return renderer.camera(isovalue, size, surfaces=surfaces)
+
+    def turntable(
+        self,
+        num_views: int,
+        isovalue: Isovalue | None = None,
+        *,
+        size: tuple[int, int] = (1280, 720),
+        surfaces: Sequence[Surface] = (),
+        device: str | int | None = None,
+    ) -> list[Camera]:
+        """Views once around the surfaces, as those of `isowave render --turntable`.
+
+        The views turn about the world's y axis, from so far that the surfaces are in all pictures
+        of that size. The first view is from where camera() looks.
+        """
+        with self._lock:
+            renderer = self._renderer_for({"device": device})
+            return renderer.turntable(num_views, isovalue, size, surfaces=surfaces)
+
+    def scene(self) -> Scene:
+        """An empty scene of this volume: scene().surface(80, "bone").render()."""
+        return Scene(self)
 
     def render(
         self,
-        isovalue: Isovalue,
+        isovalue: Isovalue | None = None,
         *,
         size: tuple[int, int] = (1280, 720),
         camera: Camera | None = None,
         device: str | int | None = None,
         memory_budget: int | None = None,
+        surfaces: Sequence[Surface] = (),
+        field: Voxels | None = None,
         **more: Any,
     ) -> Image:
-        """Draws the isosurface; Renderer.render has the other arguments.
+        """Draws the isosurface, or several; Renderer.render has the other arguments.
 
         The renderer is kept for the next call. If there is no GPU, the host draws. A GPU's driver
         may compile its kernels for half a minute the first time on a machine. The host draws
@@ -132,9 +160,15 @@ class Volume(Voxels):
             None: the surface fills the picture.
         device, memory_budget
             As Renderer's.
+        surfaces
+            As Renderer.render's: instead of `isovalue`, up to 8 surfaces, also translucent ones.
+        field
+            As Renderer's: a second volume, for color_map=ColorMap(by="field"). With by="caps",
+            None: this volume.
         """
-        request = Request(self._isovalue(isovalue), camera, size, **more)
-        return self.draw(request, device=device, memory_budget=memory_budget)
+        value = self._isovalue(isovalue_or_surfaces(isovalue, surfaces))
+        request = Request(value, camera, size, surfaces=surfaces, **more)
+        return self.draw(request, device=device, memory_budget=memory_budget, field=field)
 
     def draw(
         self,
@@ -142,10 +176,16 @@ class Volume(Voxels):
         *,
         device: str | int | None = None,
         memory_budget: int | None = None,
+        field: Voxels | None = None,
     ) -> Image:
         """Draws a frame with a size, as render()."""
         wanted: dict[str, Any] = {"device": device, "memory_budget": memory_budget}
         wanted |= {"size": request.size, **dict.fromkeys(request.needs, True)}
+        wanted["surfaces"] = request.num_surfaces
+        if field is None and request.shows_caps:
+            field = self
+        if field is not None:
+            wanted["field"] = field
         wanted["levels"] = not {"levels", "bounds", "time_budget"}.isdisjoint(request.needs)
         if request.samples != 1:
             wanted["samples"] = request.samples
@@ -162,14 +202,18 @@ class Volume(Voxels):
             and size[0] * size[1] * samples**2 <= self._renderer.max_rays
             and made.get("device") == wanted.get("device")
             and made.get("memory_budget") == wanted.get("memory_budget", made.get("memory_budget"))
-            and all(self._renderer._can[name] or not wanted.get(name) for name in CAPABILITIES)
+            and made.get("field") is wanted.get("field", made.get("field"))
+            and all(self._renderer._can[name] >= wanted.get(name, 0) for name in CAPABILITIES)
         )
         if self._renderer is None or not fits:
             self._renderer = None  # its memory goes before that of the next is taken
             largest = max(size, (1280, 720), key=lambda s: s[0] * s[1])
             # The new one can do what the old one could, or two kinds of requests in turn would make
             # it anew each time.
-            more = {name: bool(wanted.get(name) or made.get(name)) for name in CAPABILITIES}
+            more = {
+                name: max(wanted.get(name, default), made.get(name, default))
+                for name, default in CAPABILITIES.items()
+            }
             self._made_with = {**wanted, **more}
             try:
                 self._renderer = self._make_renderer(largest, self._made_with)
@@ -181,7 +225,7 @@ class Volume(Voxels):
     def _make_renderer(self, largest: tuple[int, int], options: dict[str, Any]) -> Renderer:
         device = "" if options.get("device") is None else str(options["device"])
         if options.get("memory_budget") is None and _core.draws_on_host(device):
-            if self._fits_host():
+            if options.get("field") is None and self._fits_host():
                 return self._host_renderer()  # which cast_rays() uses, too
         return Renderer(self, size=largest, quick=True, **options)
 

@@ -36,7 +36,8 @@ from isowave._camera import Camera, vector
 from isowave._checked import Isovalue
 from isowave._clip import ClipPlane
 from isowave._image import Image
-from isowave._request import Color, Request
+from isowave._request import Request
+from isowave._surface import Color
 from isowave._volume import Volume
 
 __all__ = ["Isosurface", "add_isosurface", "screenshot"]
@@ -201,7 +202,7 @@ def add_isosurface(
         The surface is where the trilinear field crosses this value. "auto": the first of
         Volume.suggested_isovalues().
     color
-        "#rrggbb", or red, green, blue from 0 to 1.
+        "#rrggbb", a name such as "bone", or red, green, blue from 0 to 1.
     device, memory_budget
         As for Volume.render.
     max_error, by, voxel_pixels, normals, clip, caps

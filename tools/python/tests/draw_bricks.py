@@ -33,6 +33,8 @@ for samples in (1, 2):
         pictures[f"rgba{samples}"] = image.rgba
 camera = isowave.Camera.orbit(renderer, 3)[1]
 keep("orbit", renderer.render(90, camera=camera, outputs=("rgb", "depth")))
+turned = renderer.turntable(3, 90)[1]
+keep("turntable", renderer.render(90, camera=turned, outputs=("rgb", "depth")))
 keep("depth", renderer.render(90, outputs=("depth",)))
 assert renderer.shape == (32, 33, 64)
 assert renderer.device["name"]
@@ -45,6 +47,10 @@ bounded = isowave.BrickRenderer(levelled, comm, size=(64, 48), levels=True, boun
 keep("bounded", bounded.render(40, max_error=0.5, outputs=("rgb", "depth", "bounds")))
 rated = isowave.BrickRenderer(fuel, comm, size=(64, 48), bounds=True, rate=8)
 keep("rated", rated.render(40, voxel_error=2.0, outputs=("bounds", "depth")))
+
+layered = isowave.BrickRenderer(fuel, comm, size=(64, 48), surfaces=2, exact=True)
+both = [isowave.Surface(20, "skin", 0.4), isowave.Surface(90, "blue", 0.7)]
+keep("surfaces", layered.render(surfaces=both))
 
 errors = {}
 
@@ -59,11 +65,14 @@ def fails(name, work):
     errors[name] = comm.allgather(text)
 
 
+fails("surfaces", lambda: renderer.render(surfaces=both))
+fails("neither", lambda: renderer.render())
 fails("isovalue", lambda: renderer.render(40 + rank))
 fails("auto", lambda: renderer.render("auto"))
 fails("auto camera", lambda: renderer.camera("auto"))
+fails("turntable", lambda: renderer.turntable(0 if rank == 1 else 3, 90))
 fails("camera", lambda: renderer.render(40, camera=camera if rank == 1 else None))
-fails("color", lambda: renderer.render(40, color="blue" if rank == 1 else None))
+fails("color", lambda: renderer.render(40, color="bluish" if rank == 1 else None))
 fails("transparent", lambda: renderer.render(40, transparent=rank == 1))
 fails("outputs", lambda: renderer.render(40, outputs=("position",)))
 fails("time", lambda: renderer.render(40, time_budget=1.0))

@@ -31,6 +31,7 @@ def drawn(tmp_path_factory, levelled):
     folder = tmp_path_factory.mktemp("bricks")
     # Kernels are compiled here, once: each process would compile them all.
     isowave.open(FUEL, exact=True).renderer(size=(96, 64), samples=2, rays=True)
+    isowave.open(FUEL, exact=True).renderer(size=(64, 48), surfaces=2)
     for bounds in (False, True):
         isowave.open(levelled).renderer(size=(64, 48), levels=True, bounds=bounds)
     program = pathlib.Path(__file__).with_name("draw_bricks.py")
@@ -70,7 +71,18 @@ def test_the_bits_of_one_process(drawn):
         np.testing.assert_array_equal(pictures[f"rgba{samples}"], image.rgba)
     camera = isowave.Camera.orbit(volume, 3)[1]
     expect(pictures, "orbit", renderer.render(90, camera=camera, outputs=("rgb", "depth")))
+    camera = renderer.turntable(3, 90)[1]
+    expect(pictures, "turntable", renderer.render(90, camera=camera, outputs=("rgb", "depth")))
     expect(pictures, "depth", renderer.render(90, outputs=("depth",)))
+
+
+def test_surfaces(drawn):
+    pictures, _ = drawn
+    renderer = isowave.open(FUEL, exact=True).renderer(size=(64, 48), surfaces=2)
+    both = [isowave.Surface(20, "skin", 0.4), isowave.Surface(90, "blue", 0.7)]
+    expect(
+        pictures, "surfaces", renderer.render(surfaces=both, outputs=("rgb", "depth", "normals"))
+    )
 
 
 def test_levels_of_detail(drawn, levelled):
@@ -97,10 +109,13 @@ def test_bounds_of_the_error(drawn, levelled):
     ("case", "text"),
     [
         ("isovalue", "rank 1 has another request than rank 0"),
+        ("surfaces", "made with_surfaces"),
+        ("neither", "give an isovalue, or surfaces"),
         ("auto", "isovalue='auto': no process sees the whole volume: give a number"),
         ("auto camera", "isovalue='auto': no process sees the whole volume: give a number"),
+        ("turntable", "num_views=0: give 1 to 100,000"),
         ("camera", "some processes give a camera"),
-        ("color", "color 'blue': give '#rrggbb'"),
+        ("color", "there is no colour 'bluish': give #RRGGBB"),
         ("transparent", "rank 1 has another request than rank 0"),
         ("outputs", "outputs position: bricks have rgb, depth, normals, bounds"),
         ("time", "a BrickRenderer draws without time_budget"),

@@ -413,7 +413,7 @@ def test_bad_requests_are_one_line(volume, renderer):
         lambda: renderer.render(6, time_budget=1.0),
         lambda: renderer.render(6, voxel_pixels=1.0),
         lambda: renderer.render(6, outputs=("rgb", "alpha")),
-        lambda: renderer.render(6, color="red"),
+        lambda: renderer.render(6, color="reddish"),
         lambda: renderer.render(6, color=(1, 2, 3)),
         lambda: renderer.render(6, camera=isowave.Camera((0, 0, 0), (0, 0, 0))),
         lambda: volume.renderer(device="no such device"),

@@ -342,8 +342,8 @@ def test_parallel_projection(plotter, volume):
 
 
 def test_what_cannot_be_drawn(plotter, volume):
-    with pytest.raises(ValueError, match="color"):
-        adapter.add_isosurface(plotter, volume, RADIUS, color="red")
+    with pytest.raises(ValueError, match="there is no colour 'reddish'"):
+        adapter.add_isosurface(plotter, volume, RADIUS, color="reddish")
     with pytest.raises(ValueError, match="normals"):
         adapter.add_isosurface(plotter, volume, RADIUS, normals="none")
     adapter.add_isosurface(plotter, volume, RADIUS, device="no such device")

@@ -33,6 +33,21 @@ def test_alpha_is_the_share_of_rays_that_hit(volume, renderer):
         assert np.array_equal(on_host.rgba, rgba)
 
 
+def test_alpha_of_a_picture_over_a_gradient(renderer):
+    colors = {"background": (0.9, 0.5, 0), "background_top": "#1040f0"}
+    over = renderer.render(6, samples=3, **colors)
+    rows = 1 - (np.arange(48) + 0.5) / 48
+    bottom, top = np.array([0.9, 0.5, 0]) * 255, np.array([0x10, 0x40, 0xF0])
+    expected = bottom + rows[:, None] * (top - bottom)
+    alone = over.rgba[..., 3] == 0
+    assert np.abs(over.rgb - expected[:, None])[alone].max() <= 0.5001
+    # Rounded once more, of a part of a pixel: up to half a level, and one for each ray of nine.
+    transparent = renderer.render(6, samples=3, transparent=True).rgba
+    edge = (over.rgba[..., 3] > 128) & (over.rgba[..., 3] < 255)
+    assert edge.any()
+    assert np.abs(over.rgba[edge].astype(int) - transparent[edge]).max() <= 2
+
+
 def test_alpha_needs_no_depth_and_leaves_no_rgb(renderer):
     image = renderer.render(6, samples=2, transparent=True, outputs=("rgb",))
     whole = renderer.render(6, samples=2, transparent=True)
@@ -88,3 +103,5 @@ def test_a_background_is_refused(renderer):
     for background in ("#ffffff", (0, 0, 0)):
         with pytest.raises(ValueError, match="background: a transparent picture has none"):
             renderer.render(6, transparent=True, background=background)
+        with pytest.raises(ValueError, match="background_top: a transparent picture has none"):
+            renderer.render(6, transparent=True, background_top=background)

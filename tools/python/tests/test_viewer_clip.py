@@ -35,7 +35,7 @@ def test_sliders_clip_the_volume(open_page: Callable[..., Any]) -> None:  # noqa
         slider["x from"].fill("25")
         assert asked(page, volume) == ((ClipPlane((1, 0, 0), MOST / 4),), True)
         slider["y to"].fill("50")
-        page.get_by_label("Caps").uncheck()
+        page.get_by_label("Caps", exact=True).uncheck()
         planes = ClipPlane((1, 0, 0), MOST / 4), ClipPlane((0, -1, 0), -MOST / 2)
         assert asked(page, volume) == (planes, False)
         assert (state(page)["clip"], state(page)["caps"]) == ("25,100,0,50,0,100", "0")

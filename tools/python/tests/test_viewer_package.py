@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from conftest import sphere_voxels
 from PIL import Image
+from viewer_fakes import PLAIN_WISH
 
 import isowave
 from isowave._request import Request
@@ -23,21 +24,11 @@ if not isowave.devices():
     pytest.skip("no OpenCL device", allow_module_level=True)
 
 TIMEOUT = 300  # seconds; kernels may have to be compiled
-WISH: dict[str, Any] = {
-    "type": "wish",
-    "id": 1,
+WISH = PLAIN_WISH | {
     "isovalue": 8.5,
     "size": [90, 70],
-    "camera": None,
     "color": [0.5, 0.25, 1],
     "background": [1, 1, 0],
-    "samples": 1,
-    "max_error": None,
-    "by": "proof",
-    "time_budget": None,
-    "ambient": 0,
-    "clip": [],
-    "caps": True,
 }
 
 
@@ -106,7 +97,7 @@ def test_the_lossless_picture_has_the_renderers_bits(
 
 
 def test_the_host_draws_the_devices_bits(volume: isowave.Volume) -> None:
-    renderers = [volume.renderer(size=(90, 70)), make_host(volume, "cpu")]
+    renderers = [volume.renderer(size=(90, 70)), make_host(volume, None, "cpu")]
     pictures = []
     for renderer in renderers:
         assert renderer is not None
@@ -131,7 +122,7 @@ def test_without_a_gpu_the_hosts_renderer_draws_all(
     if any(device["type"] in ("gpu", "accelerator") for device in isowave.devices()):
         pytest.skip("a GPU draws by default")
     monkeypatch.delenv("ISOWAVE_DEVICE", raising=False)
-    assert make_host(volume, None) is None and make_host(volume, "host") is None
+    assert make_host(volume, None, None) is None and make_host(volume, None, "host") is None
     scene = Scene(volume, size=(128, 96))
     front = Front(scene)
     front.session.receive({**WISH, "size": [300, 200], "max_error": 1.0, "ambient": 2})

@@ -7,12 +7,13 @@ import itertools
 import json
 import os
 import random
+from dataclasses import replace
 from typing import Any
 
 import pytest
-from viewer_fakes import FakeVolume
+from viewer_fakes import PLAIN_WISH, FakeVolume
 
-from isowave import Camera, ClipPlane
+from isowave import Camera, ClipPlane, ColorMap, Surface
 from isowave._request import Request
 from isowave.viewer.protocol import (
     VERSION,
@@ -20,6 +21,7 @@ from isowave.viewer.protocol import (
     Budget,
     Hello,
     ProtocolError,
+    SceneFile,
     Wish,
     check,
     parse,
@@ -28,11 +30,10 @@ from isowave.viewer.scene import Scene
 from isowave.viewer.session import Session
 
 CAMERA = {"eye": [0, 0, 5], "at": [0, 0, 0], "up": [0, 1, 0], "fovy_deg": 60}
+SURFACE = {"isovalue": 80, "color": [1, 0.5, 0], "opacity": 0.5}
 PLANE = {"normal": [1, 0, 0], "offset": 5}
-WISH: dict[str, Any] = {
-    "type": "wish",
+WISH = PLAIN_WISH | {
     "id": 7,
-    "isovalue": 80,
     "size": [64, 48],
     "camera": CAMERA,
     "color": [1, 0.5, 0],
@@ -40,11 +41,14 @@ WISH: dict[str, Any] = {
     "samples": 2,
     "max_error": 0.5,
     "by": "sample",
-    "time_budget": None,
     "ambient": 16,
     "clip": [{"normal": [0, 0.5, -1], "offset": -20}],
     "caps": False,
 }
+COLOR_MAP = {"colors": "magma", "by": "axis", "axis": [0, 0, 1], "range": [-1, 5.5]}
+SHADOW = {"rays": 16, "angle": 6}
+LIT = {"light": [0, 1, 0], "shadow": SHADOW}
+WEIGHTS = {"ambient": 0.1, "diffuse": 0, "specular": 0.2, "above": 3}
 
 
 def test_messages_are_read() -> None:
@@ -61,8 +65,30 @@ def test_messages_are_read() -> None:
     timed = check({**WISH, "max_error": None, "time_budget": 50})
     assert isinstance(timed, Wish) and timed.request.time_budget == 0.05  # ms to seconds
     assert timed.request.by == "proof"  # there is no error to judge
+    layered = check({**WISH, **PLAIN, "surfaces": [SURFACE, {**SURFACE, "isovalue": 120}]})
+    assert isinstance(layered, Wish) and layered.request.color is None
+    surface = Surface(80, (1, 0.5, 0), 0.5)
+    assert layered.request.surfaces == (surface, replace(surface, isovalue=120))
+    mapped = check({**WISH, "color_map": COLOR_MAP, "lights": WEIGHTS, "light": [0, 1, 0]})
+    assert isinstance(mapped, Wish) and mapped.request.color is None
+    expected = Request(80, color_map=ColorMap("magma", (0, 0, 1), (-1, 5.5)), lights=WEIGHTS)
+    assert mapped.request.color_map == expected.color_map
+    assert mapped.request.lights == expected.lights and mapped.request.light == (0, 1, 0)
+    whole = check({**WISH, "color_map": {**COLOR_MAP, "range": None}})
+    assert isinstance(whole, Wish)
+    assert whole.request.color_map == Request(80, color_map=ColorMap("magma")).color_map
+    lit = check({**WISH, **LIT})
+    assert isinstance(lit, Wish)
+    assert (lit.request.shadow_rays, lit.request.light_angle) == (16, 6)
+    for by in ("field", "caps"):
+        shown = check({**WISH, "color_map": {**COLOR_MAP, "by": by}})
+        assert isinstance(shown, Wish) and shown.request.color == (1, 0.5, 0), "without a value"
+        expected = Request(80, color_map=ColorMap("magma", (0, 0, 1), (-1, 5.5), by))
+        assert shown.request.color_map == expected.color_map
+    assert check({"type": "scene", "text": "{}"}) == SceneFile("{}")
 
 
+PLAIN: dict[str, Any] = {"max_error": None, "ambient": 0}
 BAD_WISHES: list[tuple[dict[str, Any], str]] = [
     ({"id": -1}, "id"),
     ({"id": 1.5}, "id"),
@@ -89,6 +115,49 @@ BAD_WISHES: list[tuple[dict[str, Any], str]] = [
     ({"clip": [{**PLANE, "normal": [2, 0, 0]}]}, "normal must be a number from -1 to 1"),
     ({"clip": [{**PLANE, "offset": float("nan")}]}, "offset"),
     ({"caps": 1}, "caps must be true or false"),
+    ({"color_map": "magma"}, "color_map must have colors, by, axis and range"),
+    ({"color_map": {**COLOR_MAP, "more": 1}}, "color_map must have colors, by, axis and range"),
+    ({"color_map": {**COLOR_MAP, "by": "time"}}, "by of color_map must be axis, field or caps"),
+    ({"color_map": {**COLOR_MAP, "by": ["axis"]}}, "by of color_map must be axis, field or caps"),
+    (
+        {"color_map": {**COLOR_MAP, "by": "field"}, "max_error": None, "time_budget": 9},
+        "colours by the field are drawn without time_budget",
+    ),
+    ({"color_map": {**COLOR_MAP, "colors": "jet"}}, "colors must be one of viridis, magma"),
+    ({"color_map": {**COLOR_MAP, "colors": []}}, "colors must be one of viridis, magma"),
+    ({"color_map": {**COLOR_MAP, "axis": [0, 0, 0]}}, "axis must be a direction"),
+    ({"color_map": {**COLOR_MAP, "axis": [0, 0, 2]}}, "axis must be a number from -1 to 1"),
+    ({"color_map": {**COLOR_MAP, "range": [1]}}, "range must be two numbers"),
+    ({"color_map": {**COLOR_MAP, "range": [5, 5]}}, "range must have two numbers that differ"),
+    ({"light": [0, 0, 0]}, "light must be a direction"),
+    ({"light": [0, 2, 0]}, "light must be a number from -1 to 1"),
+    ({"light": "x"}, "light must be three numbers"),
+    ({"lights": 1}, "lights must have ambient, diffuse, specular, above"),
+    ({"lights": {"ambient": 1}}, "lights must have ambient, diffuse, specular, above"),
+    ({"lights": {**WEIGHTS, "above": -1}}, "above must be a number from 0 to 10"),
+    ({"shadow": SHADOW}, "shadow needs a light"),
+    ({**LIT, "shadow": 16}, "shadow must have rays and angle, and nothing else"),
+    ({**LIT, "shadow": {"rays": 16}}, "shadow must have rays and angle, and nothing else"),
+    ({**LIT, "shadow": {**SHADOW, "rays": 0}}, "rays must be an integer from 1 to 255"),
+    ({**LIT, "shadow": {**SHADOW, "rays": 256}}, "rays must be an integer from 1 to 255"),
+    ({**LIT, "shadow": {**SHADOW, "angle": 0}}, "angle must be a number from 0.01 to 45"),
+    ({**LIT, "shadow": {**SHADOW, "angle": 46}}, "angle must be a number from 0.01 to 45"),
+    ({"surfaces": SURFACE}, "surfaces must be a list of at most 8 surfaces"),
+    ({**PLAIN, "surfaces": 9 * [SURFACE]}, "surfaces must be a list of at most 8 surfaces"),
+    ({**PLAIN, "surfaces": [80]}, "a surface must have isovalue, color and opacity"),
+    ({**PLAIN, "surfaces": [{**SURFACE, "more": 1}]}, "a surface must have isovalue"),
+    ({**PLAIN, "surfaces": [{**SURFACE, "isovalue": float("nan")}]}, "isovalue must be a number"),
+    ({**PLAIN, "surfaces": [{**SURFACE, "color": "red"}]}, "color must be three numbers"),
+    ({**PLAIN, "surfaces": [{**SURFACE, "opacity": 0}]}, "opacity must be a number from 0.001"),
+    ({**PLAIN, "surfaces": [{**SURFACE, "opacity": 1.1}]}, "opacity must be a number from 0.001"),
+    ({**PLAIN, "surfaces": [SURFACE], "max_error": 1}, "surfaces are drawn without max_error"),
+    ({**PLAIN, "surfaces": [SURFACE], "time_budget": 9}, "are drawn without time_budget"),
+    ({**PLAIN, "surfaces": [SURFACE], "ambient": 8}, "surfaces are drawn without ambient"),
+    ({**PLAIN, "surfaces": [SURFACE], **LIT}, "surfaces are drawn without shadow"),
+    (
+        {**PLAIN, "surfaces": [SURFACE], "color_map": {**COLOR_MAP, "by": "caps"}},
+        "colours by the field are drawn without surfaces",
+    ),
     ({"color": [0, 0, 1.01]}, "color"),
     ({"background": [0, 0]}, "background"),
     ({"max_error": 0}, "max_error"),
@@ -109,7 +178,7 @@ BAD_WISHES: list[tuple[dict[str, Any], str]] = [
     ({"more": 1}, "other keys"),
     ({"type": "dance"}, "no known type"),
     ({"type": ["wish"]}, "no known type"),
-    ({"type": "ack"}, "other keys"),
+    ({"type": "ack"}, "lacks frame"),
 ]
 
 
@@ -159,6 +228,8 @@ VALID: list[dict[str, Any]] = [
     {"type": "ack", "frame": 0},
     {"type": "budget", "bytes": 1 << 30},
     {**WISH, "camera": None},
+    {**WISH, **PLAIN, "surfaces": [SURFACE]},
+    {**WISH, **LIT, "color_map": {**COLOR_MAP, "by": "caps"}},
 ]
 ODD: list[Any] = [
     None, True, False, 0, 1, -1, 2**31, 2**53, 2**64, 10**300, 10**400, 0.0, -0.0, 1e-320, 1e308,

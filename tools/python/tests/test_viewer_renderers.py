@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from typing import Any
 
+import numpy as np
 import pytest
+from conftest import FUEL
 from viewer_fakes import FakeVolume
 from viewer_scenes import Clock, Eye, make_scene, run, wish_of
 
-from isowave import ClipPlane
+import isowave
+from isowave import ClipPlane, ColorMap
+from isowave._request import Request
 from isowave.viewer.protocol import Ack, Budget
-from isowave.viewer.renderers import GIVE_BACK_SECONDS, MAX_CAMERA_RAYS
+from isowave.viewer.renderers import GIVE_BACK_SECONDS, MAX_CAMERA_RAYS, make_host
 from isowave.viewer.scene import CERTAIN_SECONDS, REST_SECONDS, Scene
 
 
@@ -87,7 +92,7 @@ def test_the_host_draws_while_the_device_is_prepared(works: bool) -> None:
 
     volume = FakeVolume(refuse=refuse)
     host = FakeVolume().renderer(device="host", size=(64, 48), samples=1)
-    scene = Scene(volume, isovalue=80, size=(64, 48), make_host=lambda v, d: host)
+    scene = Scene(volume, isovalue=80, size=(64, 48), make_host=lambda v, f, d: host)
     client = scene.join(post)
     assert client is not None
     scene.receive(client, wish_of(1))
@@ -211,6 +216,90 @@ def test_whole_pictures_have_ambient_rays_and_a_renderer_for_them() -> None:
     eye.wish(81.0, size=(64, 48))
     run(scene)
     assert volume.frames[-1].request.ambient == 0 and len(volume.renderers) == 2
+
+
+def test_shadows_are_drawn_as_ambient_rays_are() -> None:
+    clock, volume = Clock(), FakeVolume()
+    scene = make_scene(volume, clock, size=(64, 48), max_rays=64 * 48 * 10)
+    eye = Eye(scene)
+    lit: dict[str, Any] = {"light": (0, 1, 0), "light_angle": 6.0}
+    eye.wish(size=(64, 48), shadow_rays=7, **lit)
+    run(scene)
+    assert [r["rays"] for r in volume.renderers] == [False, True]
+    first, whole = volume.frames
+    assert (first.size, first.request.shadow_rays, first.request.light) == ((16, 12), 0, (0, 1, 0))
+    assert (whole.size, whole.request.shadow_rays) == ((64, 48), 7)
+    assert whole.request.light == (0, 1, 0) and whole.request.light_angle == 6
+    assert [(h["shadow"], h["reduced"]) for h in eye.of_type("picture")] == [(0, None), (7, None)]
+    clock.now += REST_SECONDS
+    run(scene)
+    clock.now += CERTAIN_SECONDS
+    eye.ack()
+    run(scene)
+    assert "bounds" in volume.frames[-1].request.outputs
+    assert volume.frames[-1].request.shadow_rays == 0
+    # Ambient rays give way to shadow rays; both count.
+    eye.wish(81.0, size=(64, 48), shadow_rays=7, ambient=4, **lit)
+    run(scene)
+    request = volume.frames[-1].request
+    assert (volume.frames[-1].size, request.shadow_rays, request.ambient) == ((64, 48), 7, 2)
+    eye.ack()
+    eye.wish(82.0, size=(64, 48), shadow_rays=16, ambient=4, **lit)
+    run(scene)
+    request = volume.frames[-1].request
+    assert (volume.frames[-1].size, request.shadow_rays, request.ambient) == ((64, 48), 9, 0)
+    assert eye.of_type("picture")[-1]["reduced"].endswith("0 ambient rays, 9 shadow rays.")
+    eye.ack()
+    eye.wish(83.0, size=(64, 48))
+    clock.now += GIVE_BACK_SECONDS
+    run(scene)
+    clock.now += GIVE_BACK_SECONDS
+    run(scene)
+    assert not volume.renderers[-1]["rays"], "they are given back"
+
+
+def test_renderers_are_made_with_the_field() -> None:
+    clock, volume, field = Clock(), FakeVolume(), FakeVolume(value_range=(-5.0, math.inf))
+    scene = make_scene(volume, clock, size=(64, 48), field=field, field_name="heat.zfp")
+    eye = Eye(scene)
+    assert eye.of_type("welcome")[-1]["field"] == {"name": "heat.zfp", "range": [-5, None]}
+    by_field: dict[str, Any] = {"color_map": ColorMap("magma", by="field")}
+    eye.wish(size=(64, 48), **by_field)
+    run(scene)
+    assert [r["field"] for r in volume.renderers] == [field]
+    assert volume.frames[-1].request.needs_field and not eye.of_type("error")
+    assert [h["field_range"] for h in eye.of_type("picture")] == 2 * [[3, 250.5]]
+    clock.now += REST_SECONDS
+    run(scene)
+    clock.now += CERTAIN_SECONDS
+    eye.ack()
+    run(scene)
+    assert "bounds" in volume.frames[-1].request.outputs
+    assert not volume.frames[-1].request.needs_field
+    eye.wish(81.0, size=(64, 48))
+    run(scene)
+    assert eye.of_type("picture")[-1]["field_range"] is None
+    # The volume itself, and none.
+    own = Eye(make_scene(volume, clock, field=volume))
+    assert own.of_type("welcome")[-1]["field"]["name"] == "volume"
+    without = make_scene(volume, clock)
+    eye = Eye(without)
+    assert eye.of_type("welcome")[-1]["field"] is None
+    eye.wish(size=(64, 48), **by_field)
+    run(without)
+    assert eye.of_type("error")[-1]["message"] == "the renderer was made without a field"
+
+
+def test_the_host_draws_with_the_field_meanwhile() -> None:
+    volume = isowave.open(FUEL, exact=True)
+    host = make_host(volume, volume, "cpu")
+    assert host is not None
+    color_map = ColorMap("magma", by="field")
+    camera = host.camera(40.0, (16, 12))
+    request = Request(40.0, camera, (16, 12), color_map=color_map, outputs=("rgb",))
+    expected = volume.renderer(size=(16, 12), field=volume, device="host").draw(request).rgb
+    assert np.array_equal(host.draw(request).rgb, expected)  # type: ignore[arg-type]
+    assert make_host(volume, volume, "host") is None
 
 
 def test_without_memory_for_ambient_rays_pictures_have_none() -> None:

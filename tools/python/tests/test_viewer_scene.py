@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from PIL import Image
-from viewer_fakes import Drawn, FakeVolume
+from viewer_fakes import PLAIN_WISH, Drawn, FakeVolume
 from viewer_scenes import Clock, Eye, make_scene, run, wish_of
 
 from isowave import Camera
@@ -400,7 +400,7 @@ def test_closing_does_not_wait_for_a_long_pass_or_compilation(what: str) -> None
         assert may_end.wait(60)
 
     volume = FakeVolume(**{what: hold})  # type: ignore[arg-type]
-    scene = Scene(volume, isovalue=80, make_host=lambda v, d: None)
+    scene = Scene(volume, isovalue=80, make_host=lambda v, f, d: None)
     Eye(scene).wish()
     assert began.wait(60)
     scene.close()  # returns although the pass or the compilation does not end before
@@ -428,7 +428,7 @@ def test_others_get_pictures_while_a_larger_renderer_is_made() -> None:
 
     volume = FakeVolume(refuse=refuse)
     host = FakeVolume().renderer(device="host", size=(64, 48), samples=1, rays=True)
-    scene = Scene(volume, isovalue=80, make_host=lambda v, d: host)
+    scene = Scene(volume, isovalue=80, make_host=lambda v, f, d: host)
     large, other = scene.join(lambda head, data: None), scene.join(post)
     assert large is not None and other is not None
     scene.receive(large, wish_of(1, ambient=8))
@@ -459,7 +459,7 @@ def test_the_device_overtakes_the_host() -> None:
 
     volume, by_host = FakeVolume(refuse=refuse), FakeVolume(20_000, before_host_pass)
     host = by_host.renderer(device="host", size=(64, 48), samples=1, rays=True)
-    scene = Scene(volume, isovalue=80, make_host=lambda v, d: host)
+    scene = Scene(volume, isovalue=80, make_host=lambda v, f, d: host)
     client = scene.join(post)
     assert client is not None
     scene.receive(client, wish_of(1, time_budget=1.0))  # within a time: without a first picture
@@ -577,11 +577,7 @@ def test_100_reconnects_leave_nothing() -> None:
     for i in range(100):
         session = Session(scene, post)
         session.receive({"type": "hello", "version": VERSION})
-        wish = {"type": "wish", "id": 1, "isovalue": 80, "size": [32, 32], "camera": None}
-        wish |= {"color": [1, 1, 1], "background": [0, 0, 0], "samples": 1}
-        wish |= {"max_error": None, "by": "proof", "time_budget": None, "ambient": 0}
-        wish |= {"clip": [], "caps": True}
-        session.receive(wish)
+        session.receive(PLAIN_WISH)
         if i % 10 == 0:
             assert ready.wait(60)
         ready.clear()

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from viewer_fakes import FakeVolume
+from viewer_fakes import PLAIN_WISH, FakeVolume
 
 import isowave
 
@@ -29,22 +29,6 @@ from isowave.viewer.widget import MAX_VIEWS, Widget, show  # noqa: E402
 
 TIMEOUT = 60  # seconds; for machines that are busy with other things
 HELLO = {"type": "hello", "version": VERSION}
-WISH: dict[str, Any] = {
-    "type": "wish",
-    "id": 1,
-    "isovalue": 80,
-    "size": [32, 24],
-    "camera": None,
-    "color": [1, 1, 1],
-    "background": [0, 0, 0],
-    "samples": 1,
-    "max_error": None,
-    "by": "proof",
-    "time_budget": None,
-    "ambient": 0,
-    "clip": [],
-    "caps": True,
-}
 
 
 class FrontEnd:
@@ -89,7 +73,7 @@ def front() -> Iterator[FrontEnd]:
 
 def test_a_view_sees_its_wish(front: FrontEnd) -> None:
     front.say("a", HELLO)
-    front.say("a", WISH)
+    front.say("a", PLAIN_WISH)
     front.wait("a", type="picture", stage="lossless", wish=1)
     assert front.pictures[-1].startswith(b"\x89PNG")
 
@@ -97,7 +81,7 @@ def test_a_view_sees_its_wish(front: FrontEnd) -> None:
 def test_views_have_their_own_state(front: FrontEnd) -> None:
     for i, view in enumerate("abc"):
         front.say(view, HELLO)
-        front.say(view, {**WISH, "isovalue": 50 + i})
+        front.say(view, {**PLAIN_WISH, "isovalue": 50 + i})
     for i, view in enumerate("abc"):
         front.wait(view, type="picture", stage="lossless")
         pictures = [h for h in front.heads[view] if h["type"] == "picture"]
@@ -107,12 +91,12 @@ def test_views_have_their_own_state(front: FrontEnd) -> None:
 def test_a_malformed_message_ends_one_view(front: FrontEnd) -> None:
     front.say("good", HELLO)
     front.say("bad", HELLO)
-    front.say("bad", {**WISH, "isovalue": "x"})
+    front.say("bad", {**PLAIN_WISH, "isovalue": "x"})
     front.wait("bad", type="closed", retry=False)
     for odd in (None, 1, [], "x", {"view": "a"}, {"view": 5, "message": HELLO}, {"view": "x" * 99}):
         front.widget._handle_custom_msg(odd, [])
-    front.say("unknown", WISH)
-    front.say("good", WISH)
+    front.say("unknown", PLAIN_WISH)
+    front.say("good", PLAIN_WISH)
     front.wait("good", type="picture", stage="lossless")
     assert "unknown" not in front.heads
 
@@ -125,7 +109,7 @@ def test_views_that_are_gone_leave_nothing(front: FrontEnd) -> None:
             front.say(f"view {i}", None)
     assert scene.num_clients <= MAX_VIEWS
     front.say("last", HELLO)
-    front.say("last", WISH)
+    front.say("last", PLAIN_WISH)
     front.wait("last", type="picture", stage="lossless")
 
 
@@ -135,15 +119,21 @@ def test_widgets_of_a_volume_share_a_renderer() -> None:
     assert one.widget._scene is two.widget._scene
     for front in (one, two):
         front.say("a", HELLO)
-        front.say("a", WISH)
+        front.say("a", PLAIN_WISH)
         front.wait("a", stage="whole")
     one.widget.close()
     one.widget.close()
     two.say("b", HELLO)
-    two.say("b", WISH)
+    two.say("b", PLAIN_WISH)
     two.wait("b", stage="whole")
     assert len(volume.renderers) == 1
     two.widget.close()
+    assert not widget_module._scenes
+    field = FakeVolume()
+    shown = [show(volume, field=field), show(volume, field=field), show(volume)]
+    assert len(widget_module._scenes) == 2, "with the field, and without"
+    for widget in shown:
+        widget.close()
     assert not widget_module._scenes
 
 

@@ -7,8 +7,8 @@ passes when a test lets it, and counts what exists.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -17,9 +17,33 @@ from numpy.typing import NDArray
 from isowave._camera import Camera
 from isowave._placed import Vector
 from isowave._request import Request
+from isowave._surface import Surface
 
 SIDE = 64  # voxels along each axis, spacing 1
 VALUES = 255.0  # at the centre; 0 at the middle of a face
+
+#: A wish that asks for nothing special; tests change what they are about.
+PLAIN_WISH: dict[str, Any] = {
+    "type": "wish",
+    "id": 1,
+    "isovalue": 80,
+    "size": [32, 24],
+    "camera": None,
+    "color": [1, 1, 1],
+    "background": [0, 0, 0],
+    "samples": 1,
+    "max_error": None,
+    "by": "proof",
+    "time_budget": None,
+    "ambient": 0,
+    "clip": [],
+    "caps": True,
+    "surfaces": [],
+    "color_map": None,
+    "lights": None,
+    "light": None,
+    "shadow": None,
+}
 
 
 @dataclass
@@ -113,7 +137,15 @@ class FakeRenderer:
         width, height = options["size"]
         self.memory_bytes = 48 * width * height * options["samples"] ** 2
 
-    def camera(self, isovalue: float, size: tuple[int, int]) -> Camera:
+    def camera(
+        self,
+        isovalue: float | None,
+        size: tuple[int, int],
+        *,
+        surfaces: Sequence[Surface] = (),
+    ) -> Camera:
+        if isovalue is None:
+            isovalue = min(surface.isovalue for surface in surfaces)
         centre = (SIDE - 1) / 2
         away = 2.2 * max(2.0, self._radius(isovalue)) * max(1.0, size[1] / size[0])
         return Camera((centre, centre, centre + away), (centre, centre, centre))
@@ -128,12 +160,20 @@ class FakeRenderer:
                 > width * height * self._options["samples"] ** 2
             ):
                 raise RuntimeError("the renderer was not made for so many rays")
-            if request.ambient and not self._options["rays"]:
-                raise RuntimeError("the renderer was not made for ambient rays")
+            if (request.ambient or request.shadow_rays) and not self._options["rays"]:
+                raise RuntimeError("the renderer was not made for rays of hits")
+            if len(request.surfaces) > self._options.get("surfaces", 0):
+                raise RuntimeError("the renderer was not made for so many surfaces")
+        if len(set(request.isovalues)) < len(request.isovalues):
+            raise RuntimeError(f"two surfaces have the isovalue {request.isovalue:g}")
+        if request.needs_field and self._options.get("field") is None:
+            raise RuntimeError("the renderer was made without a field")
+        if "bounds" in request.outputs and request.surfaces:
+            raise RuntimeError("errors are bounded of one opaque surface")
         if math.isnan(request.isovalue):
             raise RuntimeError("the isovalue is not a number")
         self._volume.frames.append(drawn)
-        picture = self._picture(request)
+        picture = self._layers(request)
         cached, image = request.isovalue in self._cache, picture
         for i in range(self._volume.passes):
             self._volume.before_pass(drawn)
@@ -144,6 +184,7 @@ class FakeRenderer:
                 "passes": i + 1,
                 "decoded_blocks": 0 if cached else 100 * (i + 1),
                 "errors_are_stated": False,
+                "field_range": (3.0, 250.5) if request.needs_field else None,
             }
             percent = 100.0 * (i + 1) / self._volume.passes
             if request.on_pass and not request.on_pass(FakeProgress(image, i + 1, percent)):
@@ -155,6 +196,17 @@ class FakeRenderer:
         depth = np.where(part == 0, np.inf, 5).astype(np.float32)
         bounds = np.choose(part.astype(int), [0, 0.2, 0.2, np.inf]).astype(np.float32)
         return FakeImage(image, statistics, True, depth, bounds)
+
+    def _layers(self, request: Request) -> NDArray[np.uint8]:
+        """The picture of one ball, or of balls one in another."""
+        if not request.surfaces:
+            return self._picture(request)
+        seen: NDArray[Any] = np.array(_bytes(request.background))
+        for each in sorted(request.surfaces, key=lambda s: -s.isovalue):
+            look: dict[str, Any] = {"color": each.color, "color_map": None}
+            ball = replace(request, surfaces=(), isovalue=each.isovalue, **look)
+            seen = each.opacity * self._picture(ball) + (1 - each.opacity) * seen
+        return np.round(seen).astype(np.uint8)
 
     @staticmethod
     def _radius(isovalue: float) -> float:
@@ -186,7 +238,9 @@ class FakeRenderer:
         normal = (rays * t[:, :, None] - to) / max(self._radius(isovalue), 1e-9)
         light = 0.2 + 0.8 * np.clip(-np.sum(normal * rays, axis=2), 0, 1)
         cells = np.floor(normal * 4).astype(int).sum(axis=2) % 2
-        shade = (light * (1 - 0.25 * cells))[:, :, None] * np.array(request.color)
+        shade = (light * (1 - 0.25 * cells))[:, :, None] * np.array(
+            request.color or (0.5, 0.5, 0.5)
+        )
         rgb = np.where(hit[:, :, None], shade, np.array(request.background))
         pixels = np.round(255 * rgb).astype(np.uint8)
         return np.repeat(np.repeat(pixels, 2, axis=0), 2, axis=1)[:rows, :columns].copy()

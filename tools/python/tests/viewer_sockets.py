@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from viewer_fakes import FakeVolume
+from viewer_fakes import PLAIN_WISH, FakeVolume
 from websockets.sync.client import ClientConnection, connect
 
 from isowave.viewer.protocol import VERSION
@@ -23,10 +23,7 @@ HELLO = json.dumps({"type": "hello", "version": VERSION})
 
 
 def wish_text(wish_id: int, isovalue: float = 80) -> str:
-    wish = {"type": "wish", "id": wish_id, "isovalue": isovalue, "size": [32, 24]}
-    wish |= {"camera": None, "color": [1, 1, 1], "background": [0, 0, 0], "samples": 1}
-    wish |= {"max_error": None, "by": "proof", "time_budget": None, "ambient": 0}
-    return json.dumps(wish | {"clip": [], "caps": True})
+    return json.dumps(PLAIN_WISH | {"id": wish_id, "isovalue": isovalue})
 
 
 @contextmanager

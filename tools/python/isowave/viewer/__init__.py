@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import sys
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
+
+from isowave._scene import Scene, scene_fields
 
 if TYPE_CHECKING:
     from .interfaces import VolumeLike
@@ -14,7 +17,7 @@ __all__ = ["view"]
 
 
 def view(
-    volume: VolumeLike,
+    volume: VolumeLike | Scene,
     *,
     notebook: bool | None = None,
     block: bool | None = None,
@@ -22,15 +25,19 @@ def view(
 ) -> Widget | Server | None:
     """Shows a volume: in a notebook as a widget, elsewhere in a browser tab.
 
+    volume    the volume, or a scene of one, which pages show at first
     notebook  whether to make a widget; None: if a Jupyter kernel runs and anywidget is installed
     block     in a browser: whether to wait until Ctrl-C, and then return None; None: unless Python
               is interactive
     options   isovalue     first isovalue; None, "auto": the first of Volume.suggested_isovalues()
+              field        a second volume, whose values may colour the surface; the volume
+                           itself, for its caps; None: that of the scene
               device, memory_budget [bytes], size (width, height) [pixels], samples: as for Renderer
               title        text above the picture
               max_clients  most clients at the same time
-              max_rays     most rays of a client's picture, pixels x samples^2 x (1 + ambient rays);
-                           larger pictures are drawn smaller, and say so; 150 million by default
+              max_rays     most rays of a client's picture, pixels x samples^2 x (1 + ambient and
+                           shadow rays); larger pictures are drawn smaller, and say so; 150 million
+                           by default
               height       height of the widget [CSS pixels]
               host, port, open_browser: for the server; port 0: a free one
 
@@ -39,6 +46,12 @@ def view(
     Raises ImportError with the command that installs what is missing; RuntimeError if it blocks
     and the volume cannot be drawn.
     """
+    if isinstance(volume, Scene):
+        fields = scene_fields(volume)
+        options["scene"] = json.dumps(fields)
+        field = volume.volume if fields["field"] else volume.field
+        options.setdefault("field", field)
+        volume = cast("VolumeLike", volume.volume)
     if notebook is None:
         notebook = _in_notebook()
     if notebook:

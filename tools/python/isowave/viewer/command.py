@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import re
 import socket
@@ -13,6 +14,8 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from isowave._compress import open as open_volume
+from isowave._core import read_scene
+from isowave._scene_file import open_field
 
 from . import missing
 from .protocol import MAX_RAYS, first_line
@@ -67,12 +70,23 @@ def make_parser() -> argparse.ArgumentParser:
         description="Shows isosurfaces of a volume in a browser, until Ctrl-C ends it.",
     )
     add = parser.add_argument
-    add("volume", help="file of any format that isowave reads, or generate:...")
+    add(
+        "volume",
+        nargs="?",
+        help="file of any format that isowave reads, or generate:... [that of --scene]",
+    )
     add(
         "-i",
         "--isovalue",
         type=float,
         help="first isovalue [the first that `isowave info` suggests]",
+    )
+    add("--scene", metavar="FILE", help="scene file (JSON) that the page shows at first")
+    add(
+        "--field",
+        metavar="FILE",
+        help="second volume, whose values may colour the surface; volume: the same one, for its "
+        "caps [that of --scene]",
     )
     add("--device", help="host, or a device: index, gpu, cpu, a part of its name [gpu, else host]")
     add("--memory-budget", type=_argument(parse_bytes), help="most memory to draw: 600MB, 1GiB")
@@ -93,11 +107,34 @@ def make_parser() -> argparse.ArgumentParser:
         "--max-rays",
         type=int,
         default=MAX_RAYS,
-        help="most rays of a client's picture: pixels x samples x (1 + ambient rays); larger "
-        "pictures are drawn smaller, which the page says [%(default)s]",
+        help="most rays of a client's picture: pixels x samples x (1 + ambient and shadow rays); "
+        "larger pictures are drawn smaller, which the page says [%(default)s]",
     )
     add("--no-browser", action="store_true", help="only print the URL")
     return parser
+
+
+def scene_of(arguments: argparse.Namespace) -> dict[str, Any]:
+    """The fields of --scene; none without. Raises ValueError, isowave.Error."""
+    if arguments.scene is None:
+        if arguments.volume is None:
+            raise ValueError("give a volume, or a scene that names one")
+        return {}
+    if arguments.isovalue is not None:
+        raise ValueError("--scene has isovalues of its own: leave out --isovalue")
+    fields = read_scene(arguments.scene)
+    if arguments.volume is None and not fields["volume"]:
+        raise ValueError(f"{arguments.scene} names no volume: give one")
+    if fields["color_by_field"] and not (fields["field"] or arguments.field):
+        raise ValueError(f"{arguments.scene} names no field: give --field")
+    return fields
+
+
+def field_of(arguments: argparse.Namespace, fields: dict[str, Any]) -> str:
+    """The field's file: that of --field, or of the scene if its colours need it; "": none."""
+    if arguments.field is not None:
+        return str(arguments.field)
+    return str(fields["field"]) if fields.get("color_by_field") else ""
 
 
 def _argument(parse: Any) -> Any:
@@ -134,9 +171,18 @@ def main(argv: Sequence[str] | None = None) -> int:
             "dtype": arguments.type,
             "spacing": reversed_axes("--spacing", arguments.spacing),
         }
+        fields = scene_of(arguments)
+        given = {key: value for key, value in given.items() if value is not None}
+        name, of_field = arguments.volume or fields["volume"], field_of(arguments, fields)
+        # The field comes first: if it cannot be opened, the volume need not be compressed.
+        field = None if of_field in ("", "volume") else open_field(of_field, given)
+        volume = open_volume(name, **given)
         server = serve(
-            open_volume(arguments.volume, **{k: v for k, v in given.items() if v is not None}),
-            title=Path(arguments.volume).name,
+            volume,
+            field=volume if of_field == "volume" else field,
+            field_name=Path(of_field).name,
+            title=Path(name).name,
+            scene=json.dumps(fields) if arguments.scene else "",
             isovalue=arguments.isovalue,
             device=arguments.device,
             memory_budget=arguments.memory_budget,

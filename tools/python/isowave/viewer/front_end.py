@@ -5,7 +5,17 @@ from __future__ import annotations
 from importlib import resources
 from typing import Final
 
-PARTS: Final = ("state.js", "clip.js", "markup.js", "view.js", "homes.js")
+PARTS: Final = (
+    "state.js",
+    "clip.js",
+    "surfaces.js",
+    "looks.js",
+    "scenes.js",
+    "facts.js",
+    "markup.js",
+    "view.js",
+    "homes.js",
+)
 
 
 def script() -> str:

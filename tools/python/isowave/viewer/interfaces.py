@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from isowave._camera import Camera
 from isowave._placed import Vector
 from isowave._request import Request
+from isowave._surface import Surface
 
 
 class ImageLike(Protocol):
@@ -64,7 +65,13 @@ class RendererLike(Protocol):
     def memory_bytes(self) -> int:
         ...
 
-    def camera(self, isovalue: float, size: tuple[int, int]) -> Camera:
+    def camera(
+        self,
+        isovalue: float | None,
+        size: tuple[int, int],
+        *,
+        surfaces: Sequence[Surface] = (),
+    ) -> Camera:
         ...
 
     def draw(self, request: Request) -> ImageLike:

@@ -28,6 +28,9 @@ const HTML = `
       <button type="button" name="shot">Screenshot</button>
       <button type="button" name="copy">Copy camera</button>
       <button type="button" name="paste" aria-expanded="false">Paste camera</button>
+      <button type="button" name="save_scene">Save scene</button>
+      <button type="button" name="open_scene">Open scene</button>
+      <input name="scene_file" type="file" accept=".json" aria-label="Scene file" hidden>
     </div>
     <form class="paste" hidden>
       <label>Camera file (JSON)
@@ -36,10 +39,14 @@ const HTML = `
       <div class="buttons">
         <button>Use it</button><button type="button" name="cancel">Cancel</button></div>
     </form>
-    <h2>Colour</h2>
-    <label>Surface <input name="color" type="color"></label>
+    <h2>Surfaces</h2>
+    <ol class="surfaces" aria-label="Surfaces"></ol>
+    <div class="buttons"><button type="button" name="add">Add surface</button></div>
+    ${LOOK_ROWS}
     <label>Background <input name="background" type="color"></label>
     <h2>Clip</h2>${CLIP_ROWS}
+    <p class="planes" hidden><span></span> <button type="button" name="drop_planes">Remove</button>
+    </p>
     <label title="Flat caps where the volume is cut; otherwise cuts show the surface from within">
       Caps <input name="caps" type="checkbox"></label>
     <h2>Quality</h2>
@@ -121,9 +128,24 @@ const CSS = `
 .volume { margin: 0 0 10px; color: var(--soft); font-size: 12px; }
 .panel label { display: flex; justify-content: space-between; align-items: center; gap: 8px;
   min-height: 30px; }
-.panel :is(select, input[type=color]) { flex: none; width: 76px; margin-right: 32px; }
+.panel select { flex: none; width: 108px; }
+.panel input[type=color] { flex: none; width: 76px; margin-right: 32px; }
+.surfaces { list-style: none; margin: 0 0 6px; padding: 0; }
+.surfaces li { display: flex; align-items: center; gap: 4px; min-height: 32px; padding: 0 4px;
+  margin: 0 -7px; border-left: 3px solid transparent; }
+.surfaces li[aria-current] { border-color: var(--accent); background: var(--back); }
+.surfaces input { min-width: 0; }
+.panel .surfaces input[type=color] { width: 30px; margin: 0; }
+.panel .surfaces input[type=number] { flex: 0 0 68px; width: 68px; padding: 0 5px; }
+.surfaces input[type=range] { flex: 1; accent-color: var(--accent); }
+.surfaces button { flex: none; width: 28px; padding: 0; }
+.surfaces svg { display: block; margin: auto; }
+.surfaces [aria-pressed=true] .off { display: none; }
+:disabled { opacity: .45; cursor: default; }
 .clip { display: flex; align-items: center; gap: 8px; min-height: 30px; }
 .clip span { width: 1ch; }
+.planes { display: flex; justify-content: space-between; align-items: center; margin: 0;
+  min-height: 30px; }
 .clip div { position: relative; flex: 1; height: 20px; background: linear-gradient(var(--bars),
   var(--bars)) center / calc(100% - ${THUMB}px) 2px no-repeat; }
 .clip input { position: absolute; inset: 0; width: 100%; height: 20px; margin: 0;
@@ -170,6 +192,6 @@ summary { cursor: pointer; }
   .panel { width: auto; border: 0; border-top: 1px solid var(--line); overflow: visible; }
 }
 @media (pointer: coarse) { button, input[type=number], select { height: 36px; }
-  .panel label { min-height: 40px; } }
+  .panel label, .surfaces li { min-height: 40px; } }
 @media (prefers-reduced-motion: reduce) { * { transition: none !important; } }
 `;

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from isowave._core import Error, parse_scene
+
 from .interfaces import ImageLike, VolumeLike
 from .pictures import Extent
 from .protocol import VERSION, first_line
@@ -17,9 +19,14 @@ from .turns import Frame, Stage
 
 
 def welcome(
-    volume: VolumeLike, title: str, value_range: tuple[float, float], isovalue: float | None
+    volume: VolumeLike,
+    title: str,
+    value_range: tuple[float, float],
+    isovalue: float | None,
+    scene: dict[str, Any] | None,
+    field: dict[str, Any] | None,
 ) -> dict[str, Any]:
-    """Facts about the volume. isovalue: the first one."""
+    """Facts about the volume. isovalue: the first one. scene: fields of the first one."""
     return {
         "type": "welcome",
         "version": VERSION,
@@ -32,7 +39,23 @@ def welcome(
         "bits_per_voxel": float(volume.bits_per_voxel),
         "max_error": finite(volume.max_error),
         "isovalue": isovalue,
+        "scene": scene,
+        "field": field,
     }
+
+
+def field(volume: VolumeLike, name: str) -> dict[str, Any]:
+    """Facts about the second volume. name: of its file; "volume": it is the drawn one."""
+    return {"name": name, "range": [finite(value) for value in volume.value_range]}
+
+
+def scene(text: str) -> dict[str, Any]:
+    """The fields of a scene file, or what is wrong with it."""
+    try:
+        fields = parse_scene(text)
+    except Error as raised:
+        return error(raised, None)
+    return {"type": "scene", "fields": fields}
 
 
 def status(volume: VolumeLike, renderers: Renderers) -> dict[str, Any]:
@@ -50,11 +73,12 @@ def status(volume: VolumeLike, renderers: Renderers) -> dict[str, Any]:
     }
 
 
-def histogram(counts: NDArray[Any], edges: NDArray[Any]) -> dict[str, Any]:
+def histogram(counts: NDArray[Any], edges: NDArray[Any], suggested: list[float]) -> dict[str, Any]:
     return {
         "type": "histogram",
         "counts": [int(n) for n in counts],
         "range": [float(edges[0]), float(edges[-1])],
+        "suggested": suggested,
     }
 
 
@@ -74,6 +98,8 @@ def picture(frame: Frame, stage: str, seconds: float) -> dict[str, Any]:
         "size": list(frame.extent.size),
         "samples": frame.extent.samples,
         "ambient": frame.extent.ambient,
+        "shadow": frame.extent.shadow,
+        "field_range": None,
         "reduced": None,
         "notice": "",
         "isovalue": frame.wish.request.isovalue,
@@ -96,15 +122,18 @@ def finished_picture(
     frame: Frame, seconds: float, image: ImageLike, volume: VolumeLike, renderers: Renderers
 ) -> dict[str, Any]:
     statistics = image.statistics
+    notices = map(volume.isovalue_notice, frame.wish.request.isovalues)
     return {
         **picture(frame, frame.stage.value, seconds),
         "reduced": reduced(frame, renderers),
-        "notice": volume.isovalue_notice(frame.wish.request.isovalue),
+        "notice": " ".join(filter(None, notices)),
         "complete": bool(image.complete),
         "passes": int(statistics["passes"]),
+        "rays_cut": int(statistics.get("rays_cut", 0)),
         "percent": 100.0,
         "decoded_blocks": int(statistics["decoded_blocks"]),
         "detail": plain(statistics.get("detail")),
+        "field_range": pair(statistics.get("field_range")),
     }
 
 
@@ -119,7 +148,8 @@ def reduced(frame: Frame, renderers: Renderers) -> str | None:
         why = f"The server draws at most {most:,} rays, {min(first, most):,} from the camera"
     width, height = extent.size
     rays, ambient = count(extent.samples**2, "ray"), count(extent.ambient, "ambient ray")
-    return f"{why}: this picture has {width} x {height} pixels, {rays} a pixel, {ambient}."
+    shadow = f", {count(extent.shadow, 'shadow ray')}" if asked.shadow else ""
+    return f"{why}: this picture has {width} x {height} pixels, {rays} a pixel, {ambient}{shadow}."
 
 
 def count(number: int, thing: str) -> str:
@@ -130,6 +160,10 @@ def finite(value: object) -> float | None:
     if isinstance(value, (int, float, np.number)) and math.isfinite(float(value)):
         return float(value)
     return None
+
+
+def pair(value: object) -> list[float | None] | None:
+    return [finite(v) for v in value] if isinstance(value, (tuple, list)) else None
 
 
 def plain(value: object) -> dict[str, Any] | None:

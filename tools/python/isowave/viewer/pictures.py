@@ -26,18 +26,19 @@ class Extent:
 
     size     width, height [pixels]
     samples  rays per pixel along each axis
-    ambient  ambient rays per hit
+    ambient, shadow  ambient rays and shadow rays per hit
     """
 
     size: tuple[int, int]
     samples: int
     ambient: int = 0
+    shadow: int = 0
 
     @staticmethod
     def of(request: Request) -> Extent:
         """The extent of a request with a size."""
         assert request.size is not None
-        return Extent(request.size, request.samples, request.ambient)
+        return Extent(request.size, request.samples, request.ambient, request.shadow_rays)
 
     @property
     def rays(self) -> int:
@@ -46,14 +47,28 @@ class Extent:
 
     @property
     def all_rays(self) -> int:
-        """Most rays, with the ambient ones."""
-        return self.rays * (1 + self.ambient)
+        """Most rays, with those of hits."""
+        return self.rays * (1 + self.rays_of_hits)
+
+    @property
+    def rays_of_hits(self) -> int:
+        """Ambient rays and shadow rays, per hit."""
+        return self.ambient + self.shadow
+
+    @property
+    def of_camera(self) -> Extent:
+        """The same without rays of hits."""
+        return Extent(self.size, self.samples)
 
     def within(self, max_rays: int, max_all_rays: int) -> Extent:
-        """A smaller extent with at most so many rays: fewer pixels first, then ambient rays."""
+        """A smaller extent. It has fewer pixels, then fewer ambient rays, then fewer shadow rays.
+
+        max_rays bounds the camera's rays, max_all_rays those of the hits, too.
+        """
         size = fit_size(self.size, self.samples, min(max_rays, max_all_rays))
-        fitted = count_rays(size, self.samples)
-        return Extent(size, self.samples, min(self.ambient, max(0, max_all_rays // fitted - 1)))
+        left = max(0, max_all_rays // count_rays(size, self.samples) - 1)  # for each hit
+        shadow = min(self.shadow, left)
+        return Extent(size, self.samples, min(self.ambient, left - shadow), shadow)
 
 
 def fit_size(size: tuple[int, int], samples: int, max_rays: int) -> tuple[int, int]:

@@ -9,11 +9,21 @@ looks nowhere.
     {"type": "wish", "id": 7, "isovalue": 80, "size": [1280, 720], "camera": {...} | null,
      "color": [r, g, b], "background": [r, g, b], "samples": 1, "max_error": 0.5 | null,
      "by": "proof" | "sample", "time_budget": 100 | null, "ambient": 0,
-     "clip": [{"normal": [1, 0, 0], "offset": 20}], "caps": true}
+     "clip": [{"normal": [1, 0, 0], "offset": 20}], "caps": true,
+     "surfaces": [{"isovalue": 80, "color": [r, g, b], "opacity": 0.5}],
+     "color_map": {"colors": "viridis", "by": "axis" | "field" | "caps", "axis": [0, 0, 1],
+                   "range": [low, high] | null} | null,
+     "lights": {"ambient": 0.15, "diffuse": 0.5, "specular": 0.2, "above": 0.45} | null,
+     "light": [x, y, z] | null, "shadow": {"rays": 16, "angle": 3} | null}
     {"type": "ack", "frame": 3}
     {"type": "budget", "bytes": 600000000 | null}
+    {"type": "scene", "text": "a scene file's"}
 
-Answers are dicts with a "type": welcome, status, histogram, picture (with bytes), bounds, error;
+Without surfaces, one opaque surface is drawn, of the wish's isovalue and color. Surfaces come in
+place of these, and without max_error, time_budget, ambient rays, shadow and colours by the field.
+
+Answers are dicts with a "type": welcome, status, histogram, picture (with bytes), bounds, scene,
+error;
 view.js describes them.
 """
 
@@ -28,18 +38,25 @@ from typing import Any, Final
 
 from isowave._camera import Camera
 from isowave._clip import ClipPlane
-from isowave._request import Request
+from isowave._color_map import ColorMap
+from isowave._core import color_map_names
+from isowave._request import LIGHTS, Request
+from isowave._surface import MAX_SURFACES, Surface
 
-VERSION: Final = 4
+VERSION: Final = 7
 MAX_MESSAGE_BYTES: Final = 8192
 MAX_SIDE: Final = 8192  # pixels of a picture along each axis
 MAX_SAMPLES: Final = 8  # rays of a pixel along each axis, as the library has it
-MAX_AMBIENT: Final = 255  # rays of a hit, as the library has it
+MAX_AMBIENT: Final = 255  # rays of a hit, as the library has it; of its shadow, too
+MIN_ANGLE: Final = 0.01  # of a light [degrees]
+MAX_ANGLE: Final = 45  # as the library has it
 MAX_PLANES: Final = 14  # as the library has it
+MIN_OPACITY: Final = 1e-3  # of a surface
+MAX_LIGHT: Final = 10  # weight of a light
 MAX_TIME_BUDGET: Final = 10_000  # ms
 MAX_FLOAT32: Final = 3.4028234663852886e38
 MAX_LENGTH: Final = 1e18  # of a camera's coordinates [world units]
-MAX_RAYS: Final = 150_000_000  # of a client's picture, with the ambient ones
+MAX_RAYS: Final = 150_000_000  # of a client's picture, with those of its hits
 MAX_ID: Final = 2**53 - 1  # what JavaScript counts to
 
 
@@ -83,7 +100,14 @@ class Budget:
     bytes: int | None
 
 
-Message = Hello | Wish | Ack | Budget
+@dataclass(frozen=True)
+class SceneFile:
+    """A scene file that the front end opens: it gets the scene's fields, or an error."""
+
+    text: str
+
+
+Message = Hello | Wish | Ack | Budget | SceneFile
 
 
 class TokenBucket:
@@ -130,6 +154,8 @@ def check(content: object) -> Message:
     if reader is None:
         raise ProtocolError("a message has no known type")
     keys, read = reader
+    if lacking := [key for key in keys if key not in content]:
+        raise ProtocolError(f"a message of type {kind} lacks {', '.join(lacking)}")
     if content.keys() != keys.keys():
         raise ProtocolError(f"a message of type {kind} has other keys than {', '.join(keys)}")
     return read(content)
@@ -204,6 +230,81 @@ def _clip(value: object) -> tuple[ClipPlane, ...]:
     return tuple(_plane(plane) for plane in value)
 
 
+def _surface(value: object) -> Surface:
+    if not isinstance(value, dict) or value.keys() != {"isovalue", "color", "opacity"}:
+        raise ProtocolError("a surface must have isovalue, color and opacity, and nothing else")
+    return Surface(
+        _number(value["isovalue"], -MAX_FLOAT32, MAX_FLOAT32, "isovalue"),
+        _triple(value["color"], 0, 1, "color"),
+        _number(value["opacity"], MIN_OPACITY, 1, "opacity"),
+    )
+
+
+def _surfaces(content: dict[str, Any]) -> tuple[Surface, ...]:
+    value = content["surfaces"]
+    if not isinstance(value, list) or len(value) > MAX_SURFACES:
+        raise ProtocolError(f"surfaces must be a list of at most {MAX_SURFACES} surfaces")
+    for name in ("max_error", "time_budget", "ambient", "shadow"):
+        if value and content[name]:
+            raise ProtocolError(f"surfaces are drawn without {name}")
+    return tuple(_surface(surface) for surface in value)
+
+
+def _color_map(value: object) -> ColorMap | None:
+    if value is None:
+        return None
+    if not isinstance(value, dict) or value.keys() != {"colors", "by", "axis", "range"}:
+        raise ProtocolError("color_map must have colors, by, axis and range, and nothing else")
+    colors, by, limits = value["colors"], value["by"], value["range"]
+    if colors not in color_map_names():
+        raise ProtocolError(f"colors must be one of {', '.join(color_map_names())}")
+    if by not in ("axis", "field", "caps"):
+        raise ProtocolError("by of color_map must be axis, field or caps")
+    axis = _triple(value["axis"], -1, 1, "axis")
+    if math.hypot(*axis) < 1e-3:
+        raise ProtocolError("axis must be a direction")
+    if limits is None:
+        return ColorMap(colors, axis, None, by)
+    if not isinstance(limits, list) or len(limits) != 2:
+        raise ProtocolError("range must be two numbers")
+    low, high = (_number(limit, -MAX_LENGTH, MAX_LENGTH, "range") for limit in limits)
+    if low == high:
+        raise ProtocolError("range must have two numbers that differ")
+    return ColorMap(colors, axis, (low, high), by)
+
+
+def _lights(value: object) -> dict[str, float] | None:
+    if value is None:
+        return None
+    if not isinstance(value, dict) or value.keys() != {*LIGHTS}:
+        raise ProtocolError(f"lights must have {', '.join(LIGHTS)}, and nothing else")
+    return {name: _number(value[name], 0, MAX_LIGHT, name) for name in LIGHTS}
+
+
+def _light(value: object) -> tuple[float, float, float] | None:
+    if value is None:
+        return None
+    light = _triple(value, -1, 1, "light")
+    if math.hypot(*light) < 1e-3:
+        raise ProtocolError("light must be a direction")
+    return light
+
+
+def _shadow(content: dict[str, Any]) -> dict[str, Any]:
+    """Arguments of a Request."""
+    value = content["shadow"]
+    if value is None:
+        return {}
+    if not isinstance(value, dict) or value.keys() != {"rays", "angle"}:
+        raise ProtocolError("shadow must have rays and angle, and nothing else")
+    if content["light"] is None:
+        raise ProtocolError("shadow needs a light")
+    return {
+        "shadow_rays": _integer(value["rays"], 1, MAX_AMBIENT, "rays"),
+        "light_angle": _number(value["angle"], MIN_ANGLE, MAX_ANGLE, "angle"),
+    }
+
+
 def _flag(value: object, what: str) -> bool:
     if not isinstance(value, bool):
         raise ProtocolError(f"{what} must be true or false")
@@ -229,15 +330,26 @@ def _read_wish(content: dict[str, Any]) -> Wish:
     if content["by"] not in ("proof", "sample"):
         raise ProtocolError("by must be proof or sample")
     time_budget = _optional(content["time_budget"], 1, MAX_TIME_BUDGET, "time_budget")
+    surfaces, color = _surfaces(content), _triple(content["color"], 0, 1, "color")
+    color_map = _color_map(content["color_map"])
+    by_field = color_map is not None and color_map.by != "axis"
+    if by_field and (surfaces or time_budget is not None):
+        without = "surfaces" if surfaces else "time_budget"
+        raise ProtocolError(f"colours by the field are drawn without {without}")
     request = Request(
         isovalue=_number(content["isovalue"], -MAX_FLOAT32, MAX_FLOAT32, "isovalue"),
         camera=_camera(content["camera"]),
         size=(_integer(size[0], 1, MAX_SIDE, "size"), _integer(size[1], 1, MAX_SIDE, "size")),
         samples=_integer(content["samples"], 1, MAX_SAMPLES, "samples"),
-        color=_triple(content["color"], 0, 1, "color"),
+        color=None if surfaces or (color_map and not by_field) else color,
+        color_map=color_map,
+        lights=_lights(content["lights"]),
+        light=_light(content["light"]),
+        **_shadow(content),
         background=_triple(content["background"], 0, 1, "background"),
         clip=_clip(content["clip"]),
         caps=_flag(content["caps"], "caps"),
+        surfaces=surfaces,
         outputs=("rgb",),
         max_error=_optional(content["max_error"], 1e-3, 1e3, "max_error"),
         by=content["by"] if content["max_error"] is not None else "proof",
@@ -256,15 +368,23 @@ def _read_budget(content: dict[str, Any]) -> Budget:
     return Budget(None if value is None else _integer(value, 1, MAX_ID, "bytes"))
 
 
+def _read_scene(content: dict[str, Any]) -> SceneFile:
+    if not isinstance(content["text"], str):
+        raise ProtocolError("text must be a text")
+    return SceneFile(content["text"])
+
+
 _READERS: Final[dict[str, tuple[dict[str, None], Callable[[dict[str, Any]], Message]]]] = {
     "hello": (dict.fromkeys(("type", "version")), _read_hello),
     "wish": (
         dict.fromkeys(
             "type id isovalue size camera color background samples max_error by"
-            " time_budget ambient clip caps".split()
+            " time_budget ambient clip caps surfaces color_map lights light"
+            " shadow".split()
         ),
         _read_wish,
     ),
     "ack": (dict.fromkeys(("type", "frame")), _read_ack),
     "budget": (dict.fromkeys(("type", "bytes")), _read_budget),
+    "scene": (dict.fromkeys(("type", "text")), _read_scene),
 }

@@ -10,6 +10,7 @@ from typing import Any, Final
 from isowave import _core
 from isowave._levels import Voxels
 from isowave._renderer import host_renderer
+from isowave._surface import MAX_SURFACES
 
 from .interfaces import RendererLike, VolumeLike
 from .pictures import Extent
@@ -22,7 +23,11 @@ GIVE_BACK_SECONDS: Final = 5.0  # without need of a large renderer, until a smal
 MAX_CAMERA_RAYS: Final = 1 << 24  # of a picture: they take memory, and make passes long
 
 
-MakeHost = Callable[[VolumeLike, "str | None"], "RendererLike | None"]
+NO_SURFACES: Final = (
+    "the device has no memory for so many surfaces: draw fewer, or give a larger memory budget"
+)
+#: Makes the host's renderer for a volume, a field, and a device that is not ready, or None.
+MakeHost = Callable[[VolumeLike, "VolumeLike | None", "str | None"], "RendererLike | None"]
 
 
 @dataclass(frozen=True)
@@ -31,7 +36,8 @@ class RendererOptions:
 
     largest: Extent  # of a picture
     memory_budget: int | None
-    ambient: bool = False  # pictures may have ambient rays, which takes memory
+    rays_of_hits: bool = False  # pictures may have ambient and shadow rays, which takes memory
+    surfaces: int = 0  # most of a picture, unless it has one opaque one; each takes memory
 
     @property
     def rays(self) -> int:
@@ -43,10 +49,10 @@ class Renderers:
 
     The renderer is the host's if isowave.Renderer chooses that, as on a machine without a GPU.
 
-    device    as in isowave.Renderer
+    device, field  as in isowave.Renderer
     first     what the first renderer is made for; none is made for less
-    max_rays  of a client's picture, with the ambient ones
-    make_host makes the host's renderer for a volume and a device that is not ready, or None
+    max_rays  of a client's picture, with those of its hits
+    make_host draws until the device's renderer is made
     changed   the scene's lock; notified when a renderer is there, or cannot be made
     wishes    those of the clients now
     tell      hears of a change: an error, or None. The lock is held
@@ -58,6 +64,7 @@ class Renderers:
         self,
         volume: VolumeLike,
         *,
+        field: VolumeLike | None,
         device: str | None,
         first: RendererOptions,
         max_rays: int,
@@ -68,7 +75,8 @@ class Renderers:
         do: Callable[[Callable[[], None]], None],
         clock: Callable[[], float],
     ) -> None:
-        self._volume, self._device, self._make_host = volume, device, make_host
+        self._volume, self._field = volume, field
+        self._device, self._make_host = device, make_host
         self._changed, self._wishes, self._tell = changed, wishes, tell
         self._do, self._clock = do, clock
         self.renderer: RendererLike | None = None
@@ -84,7 +92,8 @@ class Renderers:
         self._budgets = TokenBucket(1 / GIVE_BACK_SECONDS, 5, clock)  # each makes a renderer
         self.max_rays = max_rays
         self._ray_limit = self.first_ray_limit = max(MAX_CAMERA_RAYS, first.rays)
-        self._may_have_ambient = True
+        self._may_have_rays = True  # of hits
+        self._most_surfaces = MAX_SURFACES
 
     @property
     def never_worked(self) -> bool:
@@ -115,10 +124,9 @@ class Renderers:
 
     def plan(self, wish: Wish) -> Extent:
         """The whole picture of a wish, as far as the server's limits and the memory allow it."""
-        ambient = wish.request.ambient if self._may_have_ambient else 0
-        return replace(Extent.of(wish.request), ambient=ambient).within(
-            self._ray_limit, self.max_rays
-        )
+        extent = Extent.of(wish.request)
+        plan = extent if self._may_have_rays else extent.of_camera
+        return plan.within(self._ray_limit, self.max_rays)
 
     def fitted(self, wish: Wish, stage: Stage) -> Extent:
         """A stage's picture, within what the device's renderer was made for.
@@ -132,20 +140,29 @@ class Renderers:
         if made is None or self.on_host:
             return plan.within(self._ray_limit, self.max_rays)
         fitted = plan.within(made.rays, self.max_rays)
-        return fitted if made.ambient else replace(fitted, ambient=0)
+        return fitted if made.rays_of_hits else fitted.of_camera
 
     # What renderer is wanted.
 
     def grow(self, wish: Wish, stage: Stage) -> bool:
-        """Wants a renderer for more rays, or ambient ones, if the wish's picture has such."""
+        """Wants a renderer for what the wish's picture has: more rays, those of hits, surfaces.
+
+        Raises RuntimeError, one line, if the device has no memory for the surfaces.
+        """
         if self.on_host:
             return False
         wanted, plan = self.wanted, self.plan(wish)
-        ambient = wanted.ambient or plan.ambient > 0
-        if stage is Stage.FIRST or (plan.rays <= wanted.rays and ambient == wanted.ambient):
+        surfaces = max(wanted.surfaces, room_for(wish))
+        if surfaces > self._most_surfaces:
+            raise RuntimeError(NO_SURFACES)
+        if surfaces == wanted.surfaces and stage is Stage.FIRST:
             return False
-        largest = replace(plan, ambient=0) if plan.rays > wanted.rays else wanted.largest
-        self._want(RendererOptions(largest, wanted.memory_budget, ambient))
+        of_hits = wanted.rays_of_hits or plan.rays_of_hits > 0
+        largest = plan.of_camera if plan.rays > wanted.rays else wanted.largest
+        more = RendererOptions(largest, wanted.memory_budget, of_hits, surfaces)
+        if more == wanted:
+            return False
+        self._want(more)
         return True
 
     def set_budget(self, memory_budget: int | None) -> bool:
@@ -159,13 +176,16 @@ class Renderers:
         """The smallest renderer for what clients want now. The lock is held."""
         plans = [self.plan(wish) for wish in self._wishes()]
         largest = max((self._base, *plans), key=lambda plan: plan.rays)
-        ambient = any(plan.ambient > 0 for plan in plans)
-        return RendererOptions(replace(largest, ambient=0), self.wanted.memory_budget, ambient)
+        of_hits = any(plan.rays_of_hits > 0 for plan in plans)
+        surfaces = max(map(room_for, self._wishes()), default=0)
+        budget = self.wanted.memory_budget
+        return RendererOptions(largest.of_camera, budget, of_hits, surfaces)
 
     def note_needs(self) -> None:
         """Notes since when the renderer is much larger than clients need. The lock is held."""
         needed, wanted = self._needed(), self.wanted
-        fits = needed.rays > wanted.rays / 2 and needed.ambient >= wanted.ambient
+        has_more = wanted.rays_of_hits > needed.rays_of_hits or wanted.surfaces > needed.surfaces
+        fits = needed.rays > wanted.rays / 2 and not has_more
         if fits or self.on_host:
             self._too_large_since = None
         elif self._too_large_since is None:
@@ -186,7 +206,8 @@ class Renderers:
     def _want(self, options: RendererOptions) -> None:
         with self._changed:
             if options.memory_budget != self.wanted.memory_budget:
-                self._ray_limit, self._may_have_ambient = self.first_ray_limit, True
+                self._ray_limit, self._may_have_rays = self.first_ray_limit, True
+                self._most_surfaces = MAX_SURFACES
             self.wanted, self.failed = options, False
             self.note_needs()
 
@@ -217,7 +238,9 @@ class Renderers:
             "levels": self._volume.num_levels > 1,
             "bounds": True,
             "time_budget": True,
-            "rays": wanted.ambient,
+            "rays": wanted.rays_of_hits,
+            "surfaces": wanted.surfaces,
+            "field": self._field,
         }
         try:
             renderer = self._volume.renderer(**options)
@@ -244,8 +267,10 @@ class Renderers:
                     self.wanted = fallback
                     if wanted.rays > fallback.rays:
                         self._ray_limit = fallback.rays
-                    if wanted.ambient and not fallback.ambient:
-                        self._may_have_ambient = False
+                    if wanted.rays_of_hits and not fallback.rays_of_hits:
+                        self._may_have_rays = False
+                    if wanted.surfaces > fallback.surfaces:
+                        self._most_surfaces = fallback.surfaces
             self._tell(error)
             self._changed.notify_all()
 
@@ -258,7 +283,7 @@ class Renderers:
                 return
         try:
             assert self._make_host is not None
-            host = self._make_host(self._volume, self._device)
+            host = self._make_host(self._volume, self._field, self._device)
         except Exception:  # there is not enough memory: then nothing is drawn meanwhile
             return
         with self._changed:
@@ -267,8 +292,18 @@ class Renderers:
                 self._changed.notify_all()
 
 
-def make_host(volume: VolumeLike, device: str | None) -> RendererLike | None:
+def room_for(wish: Wish) -> int:
+    """How many surfaces a renderer is made for: as one adds surfaces, it is made anew thrice."""
+    count = len(wish.request.surfaces)
+    return 1 << (count - 1).bit_length() if count else 0
+
+
+def make_host(
+    volume: VolumeLike, field: VolumeLike | None, device: str | None
+) -> RendererLike | None:
     """A renderer of the host for a volume of isowave's, unless the host draws anyway."""
     if not isinstance(volume, Voxels) or _core.draws_on_host(device or ""):
         return None
-    return host_renderer(volume)
+    if field is None:
+        return host_renderer(volume)
+    return volume.renderer(device="host", field=field)

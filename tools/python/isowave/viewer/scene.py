@@ -15,6 +15,7 @@ always sent.
 
 from __future__ import annotations
 
+import json
 import math
 import threading
 import time
@@ -25,13 +26,14 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from isowave._camera import Camera
 from isowave._checked import Isovalue
 
 from . import messages
 from .interfaces import ImageLike, ProgressLike, RendererLike, VolumeLike
 from .jpeg import encode_jpeg
 from .pictures import Extent, Stopped, encode_png, share_within
-from .protocol import MAX_FLOAT32, MAX_RAYS, Ack, Budget, Message, Wish
+from .protocol import MAX_FLOAT32, MAX_RAYS, Ack, Budget, Message, SceneFile, Wish
 from .renderers import MakeHost, RendererOptions, Renderers, make_host
 from .turns import Client, Frame, Post, Stage, Turns
 
@@ -50,14 +52,18 @@ class Scene:
     """A volume's renderer and those who look at it.
 
     isovalue       at first; None, "auto": the first of Volume.suggested_isovalues()
+    scene          what pages show at first: JSON of scene_fields(); "": the surface of `isovalue`
+    field          a second volume, for colours by its values; it may be the volume itself
+    field_name     of the field's file, for scenes that pages save
     device         as in isowave.Renderer
     memory_budget  as in isowave.Renderer
     size, samples  the largest picture that the renderer is made for at first; it is made anew when
                    a client wants more
     max_clients    further ones are refused
-    max_rays       of a client's picture: pixels x samples^2 x (1 + ambient). A larger one is drawn
-                   with fewer pixels, then fewer ambient rays, and says so. At most
-                   MAX_CAMERA_RAYS come from the camera, or as many as `size` and `samples` have.
+    max_rays       of a client's picture: pixels x samples^2 x (1 + ambient and shadow rays). A
+                   larger one is drawn with fewer pixels, then fewer of these rays, and says so. At
+                   most MAX_CAMERA_RAYS come from the camera, or as many as `size` and `samples`
+                   have.
     make_host      makes a renderer that draws while the device's is prepared, or None
     clock          seconds; tests replace it
     start          False: no thread; call step() instead, as tests do
@@ -71,6 +77,9 @@ class Scene:
         *,
         isovalue: Isovalue | None = None,
         title: str = "",
+        scene: str = "",
+        field: VolumeLike | None = None,
+        field_name: str = "",
         device: str | None = None,
         memory_budget: int | None = None,
         size: tuple[int, int] = (1920, 1080),
@@ -89,6 +98,9 @@ class Scene:
             if limit < 1:
                 raise ValueError(f"{name} {limit}: give 1 or more")
         self._volume, self._isovalue, self._title = volume, isovalue, title
+        self._field = field
+        self._field_name = "volume" if field is volume else field_name
+        self._first_scene = json.loads(scene) if scene else None
         self._max_clients, self._clock = max_clients, clock
         self._changed = threading.Condition()
         self._closing = self._prepared = False
@@ -97,6 +109,7 @@ class Scene:
         self._range = (0.0, 1.0)
         self._renderers = Renderers(
             volume,
+            field=field,
             device=device,
             first=RendererOptions(Extent(size, samples), memory_budget),
             max_rays=max_rays,
@@ -155,6 +168,8 @@ class Scene:
                 self._renderers.note_needs()
             elif isinstance(message, Budget) and not self._renderers.set_budget(message.bytes):
                 client.post(messages.error(RuntimeError(TOO_MANY_BUDGETS), None), None)
+            elif isinstance(message, SceneFile):
+                client.post(messages.scene(message.text), None)
             self._changed.notify_all()
 
     @property
@@ -282,7 +297,7 @@ class Scene:
         self, renderer: RendererLike, client: Client, wish: Wish, stage: Stage, extent: Extent
     ) -> None:
         began = self._clock()
-        camera = client.camera or renderer.camera(wish.request.isovalue, wish.size)
+        camera = client.camera or home(renderer, wish)
         with self._changed:
             if client.wish is not wish:
                 return
@@ -295,6 +310,7 @@ class Scene:
             size=extent.size,
             samples=extent.samples,
             ambient=extent.ambient,
+            shadow_rays=extent.shadow,
             on_pass=lambda so_far: self._on_pass(frame, so_far),
         )
         if frame.by_host:  # full detail until the device draws, not interrupted by a time
@@ -393,8 +409,9 @@ class Scene:
         with self._changed:
             if client.wish is wish:
                 now = self._clock()
-                is_whole = not wish.request.clip  # only errors of whole surfaces are bounded
-                client.stage = Stage.CERTAIN if is_whole else Stage.DONE
+                # Errors are bounded only of one surface, opaque and whole.
+                is_bounded = not (wish.request.clip or wish.request.surfaces)
+                client.stage = Stage.CERTAIN if is_bounded else Stage.DONE
                 client.due = now + CERTAIN_SECONDS
                 head = {**head, "stage": "lossless", "format": "png"}
                 client.offer(head, data, now, keep=True)
@@ -417,6 +434,8 @@ class Scene:
             max_error=None if max_error is None else max_error * pixels,
             time_budget=None,
             ambient=0,
+            shadow_rays=0,
+            color_map=None,
             on_pass=lambda so_far: client.wish is wish and not self._closing,
         )
         image = renderer.draw(request)
@@ -456,7 +475,11 @@ class Scene:
         return suggested[0] if suggested else (self._range[0] + self._range[1]) / 2
 
     def _welcome(self, client: Client) -> None:
-        client.post(messages.welcome(self._volume, self._title, self._range, self._isovalue), None)
+        field = None if self._field is None else messages.field(self._field, self._field_name)
+        welcome = messages.welcome(
+            self._volume, self._title, self._range, self._isovalue, self._first_scene, field
+        )
+        client.post(welcome, None)
         if self._histogram is not None:
             client.post(self._histogram, None)
 
@@ -469,13 +492,24 @@ class Scene:
             with self._changed:
                 self._broadcast(messages.error(error, None))
             return
-        message = messages.histogram(counts, edges)
+        try:
+            suggested = self._volume.suggested_isovalues()
+        except Exception:  # _first_isovalue() told of it, or there is no need of any
+            suggested = []
+        message = messages.histogram(counts, edges, suggested)
         with self._changed:
             self._histogram = message
             if self._prepared:
                 self._broadcast(message)
             else:
                 self._range = float(edges[0]), float(edges[-1])
+
+
+def home(renderer: RendererLike, wish: Wish) -> Camera:
+    """A view that the wish's surfaces fill."""
+    surfaces = wish.request.surfaces
+    isovalue = None if surfaces else wish.request.isovalue
+    return renderer.camera(isovalue, wish.size, surfaces=surfaces)
 
 
 def picture_of(image: ImageLike) -> NDArray[np.uint8]:

@@ -3,10 +3,13 @@
 
 /** @typedef {[number, number, number]} Vec */
 /** @typedef {{eye: Vec, at: Vec, up: Vec, fovy_deg: number}} Camera world space */
-/** @typedef {{isovalue: number, camera: ?Camera, color: string, background: ?string,
- *    samples: number, max_error: ?number, by: string, time_budget: ?number,
- *    ambient: number, clip: number[], caps: boolean}} State
- *    what the URL keeps. clip: from and to along x, y and z [% of the volume's box] */
+/** @typedef {{surfaces: Surface[], selected: number, camera: ?Camera,
+ *    background: ?string, samples: number, max_error: ?number, by: string, time_budget: ?number,
+ *    ambient: number, clip: number[], caps: boolean, color_map: ?ColorMap,
+ *    planes: {normal: Vec, offset: number}[], lights: ?Record<string, number>, light: ?Vec,
+ *    shadow: ?Shadow}} State
+ *    what the URL keeps, but for the surface that is selected. clip: from and to along x, y and z
+ *    [% of the volume's box]. planes: further clipping planes, of a scene file */
 
 const AMBIENT = [8, 16, 32, 64]; // rays of a hit that one can choose
 
@@ -119,7 +122,7 @@ export function writeCamera(camera, width, height) {
 export function writeHash(state) {
   const short = (v) => String(Number(v.toPrecision(9)));
   const { camera } = state;
-  const parts = { iso: short(state.isovalue), color: state.color.slice(1) };
+  const parts = writeSurfaces(state.surfaces);
   if (state.background) parts.background = state.background.slice(1);
   if (state.samples > 1) parts.samples = state.samples;
   if (state.max_error) parts.error = short(state.max_error);
@@ -128,6 +131,7 @@ export function writeHash(state) {
   if (state.ambient) parts.ambient = state.ambient;
   if (state.clip.some((percent, i) => percent !== WHOLE[i])) parts.clip = state.clip.join(",");
   if (!state.caps) parts.caps = 0;
+  Object.assign(parts, writeLook(state));
   if (camera) {
     for (const key of ["eye", "at", "up"]) parts[key] = camera[key].map(short).join(",");
     parts.fovy = short(camera.fovy_deg);
@@ -138,9 +142,10 @@ export function writeHash(state) {
 /**
  * What a URL's hash says; parts that are not understood are left out.
  * @param {string} hash
+ * @param {State} before an isovalue or a colour alone changes its selected surface
  * @returns {Partial<State>}
  */
-export function readHash(hash) {
+export function readHash(hash, before) {
   const parts = new URLSearchParams(hash.replace(/^#/, ""));
   const number = (key, low, high) => {
     const value = parts.get(key) ? Number(parts.get(key)) : NaN;
@@ -149,9 +154,14 @@ export function readHash(hash) {
   const color = (key) =>
     /^[0-9a-f]{6}$/i.test(parts.get(key) ?? "") ? `#${parts.get(key)}` : undefined;
   const vector = (key) => (parts.get(key) ?? "").split(",").map(Number);
+  const [isovalue, hex] = [number("iso", -3.4e38, 3.4e38), color("color")];
+  const { isovalue: value, color: other } = before.surfaces[before.selected];
+  const one = [makeSurface(isovalue ?? value, hex ?? other)];
+  const surfaces = readSurfaces(parts.get("surfaces") ?? "")
+    ?? (isovalue === undefined && hex === undefined ? undefined : one);
   const state = {
-    isovalue: number("iso", -3.4e38, 3.4e38),
-    color: color("color"),
+    surfaces,
+    selected: surfaces && 0,
     background: color("background"),
     samples: [1, 2, 3, 4].find((n) => n === number("samples", 1, 4)),
     max_error: number("error", 0.001, 1000),
@@ -160,6 +170,7 @@ export function readHash(hash) {
     ambient: [0, ...AMBIENT].find((n) => n === number("ambient", 0, 255)),
     clip: [vector("clip")].find(isClip),
     caps: number("caps", 0, 0) === 0 ? false : undefined,
+    ...readLook(parts),
   };
   if (parts.has("eye")) {
     try {

@@ -1,18 +1,24 @@
 // view.js -- a view: pictures come from a scene (scene.py), wishes go to it. A part of
 // an ES module (front_end.py).
 //
-// What the front end says (protocol.py checks it): hello, wish, ack, budget. What it hears:
+// What the front end says (protocol.py checks it): hello, wish, ack, budget, scene. What it hears:
 //
 //   welcome    title, shape [z,y,x], spacing, box [[x,y,z], [x,y,z]] in world space, dtype,
-//              range [low, high], bits_per_voxel, max_error of voxels, isovalue
+//              range [low, high], bits_per_voxel, max_error of voxels, isovalue, scene: fields of
+//              the scene to show at first, or null; field: name and range of the second volume
+//              ("volume": the same one), or null
 //   status     state: starting, ready, failed; device ("host": none), notice (what it computes
 //              otherwise than the host, or ""), device_memory (null on the host), memory_bytes,
 //              memory_budget, nbytes of the compressed volume
-//   histogram  counts of equally wide bins, range
+//   histogram  counts of equally wide bins, range, suggested isovalues
 //   picture    wish, frame, stage: first, pass, whole, lossless; format, size, samples, ambient,
-//              camera, isovalue, complete, passes, decoded_blocks, percent, ms, detail;
+//              shadow, camera, isovalue, complete, passes, decoded_blocks, percent, ms, detail;
+//              rays_cut: of a finished one, how many rays have more hits than are drawn;
+//              field_range: of a finished one, the least and the largest value of the field at the
+//              hits, or null;
 //              reduced: why a finished one has fewer rays than its wish, or null; notice: of a
 //              finished one, that the isovalue is outside the volume's values, or ""; and its bytes
+//   scene      fields of the scene file that was sent, as _core.parse_scene() gives them
 //   bounds     wish, within_pixel: the share of the surface that is certainly so near to that of
 //              the volume before compression; null: there is no surface. errors_are_stated: that
 //              is certain only if the errors are right that the volume's file states
@@ -28,7 +34,7 @@
  *    isDark: () => boolean}} Home where a view is. wheel: whether the wheel is the view's
  */
 
-const VERSION = 4;
+const VERSION = 7;
 const MIN_WAIT_MS = 15; // between two wishes
 const MAX_IN_WAIT_MS = 120; // for a picture of the last wish, before the next one is sent
 const MAX_PIXEL_RATIO = 2;
@@ -38,7 +44,6 @@ const ZOOM_STEP = 1.15;
 const DARK = "(prefers-color-scheme: dark)";
 
 const isFresher = (a, b) => a.wish > b.wish || (a.wish === b.wish && a.frame > b.frame);
-
 /** One view: its elements, its state, and what it has shown. */
 class View {
   /**
@@ -59,9 +64,15 @@ class View {
     this.field = (name) => this.find(`[name=${name}]`);
     this.clips = [...this.root.querySelectorAll(".clip input")];
     /** @type {State} */
-    this.state = { isovalue: NaN, camera: null, color: "#dbbd87", background: null, samples: 1,
-      max_error: null, by: "proof", time_budget: null, ambient: 0, clip: WHOLE, caps: true };
-    if (home.hash) Object.assign(this.state, readHash(location.hash));
+    this.state = { surfaces: [makeSurface(NaN)], selected: 0, camera: null, background: null,
+      samples: 1, max_error: null, by: "proof", time_budget: null, ambient: 0, clip: WHOLE,
+      caps: true, color_map: null, planes: [], lights: null, light: null,
+      shadow: null };
+    if (home.hash) Object.assign(this.state, readHash(location.hash, this.state));
+    this.isNew = !(home.hash && location.hash.length > 1); // shows the server's scene first
+    this.surfaces = new SurfaceList(this);
+    this.look = new Look(this);
+    this.scenes = new SceneFiles(this);
     this.wish = 0;
     this.shown = this.arrived = { wish: -1, frame: -1 };
     this.answered = true; // there is a picture of the last wish, or an error
@@ -89,7 +100,7 @@ class View {
    */
   receive(head, data) {
     const takers = { welcome: this.welcome, status: this.showStatus, error: this.showError,
-      histogram: this.showHistogram, bounds: this.showBounds };
+      histogram: this.showHistogram, bounds: this.showBounds, scene: this.scenes.take };
     if (head.type === "picture") return this.showPicture(head, data);
     takers[head.type]?.call(this, head);
   }
@@ -101,7 +112,10 @@ class View {
     this.find(".volume").textContent =
       `${x} × ${y} × ${z} ${head.dtype}, ${toShort(head.bits_per_voxel)} bits per voxel`;
     if (this.home.hash && head.title) document.title = `${head.title} – isowave`;
-    if (!Number.isFinite(this.state.isovalue)) this.state.isovalue = head.isovalue;
+    this.look.welcome(head);
+    if (this.isNew && head.scene) this.scenes.use(head.scene);
+    this.isNew = false;
+    if (!Number.isFinite(this.surface.isovalue)) this.surface.isovalue = head.isovalue;
     this.setRange(head.range);
     this.push();
   }
@@ -184,7 +198,7 @@ class View {
     if (!this.state.camera) this.state.camera = head.camera;
     const rest = head.stage === "whole" || head.stage === "lossless";
     this.progress(rest ? 100 : head.percent ?? 50);
-    if (rest) this.showFacts(head);
+    if (rest) this.list(".facts", factsOf(head, this.state));
     const notes = [head.notice, head.reduced].filter(Boolean);
     if (rest && notes.length) this.note(notes.join(" "), "drawing");
     if (head.stage === "lossless") {
@@ -195,33 +209,10 @@ class View {
     }
   }
 
-  showFacts(head) {
-    const share = this.state.by === "sample" ? "99 % of the hits" : "most pixels";
-    const detail = this.state.max_error ? `${share} within ${toText(this.state.max_error)} px`
-      : "at full detail";
-    const certain = !head.complete ? "the time was over: not complete"
-      : head.detail?.reachable === false ? head.detail.advice || "that error is out of reach"
-        : `complete, ${detail}`;
-    const rays = head.samples > 1 ? `, ${head.samples ** 2} rays a pixel` : "";
-    this.list(".facts", {
-      Size: `${head.size[0]} × ${head.size[1]}${rays}`,
-      Passes: toCount(head.passes),
-      "Blocks decoded": toCount(head.decoded_blocks),
-      Time: `${toShort(head.ms)} ms`,
-      Picture: certain,
-    });
-  }
-
   /** How near the surface is to that of the volume before compression. */
   showBounds(head) {
     if (head.wish !== this.wish || head.within_pixel === null) return;
-    const percent = Math.floor(1000 * head.within_pixel) / 10;
-    const [name, value] = [document.createElement("dt"), document.createElement("dd")];
-    name.textContent = head.errors_are_stated ? "By its file" : "Certain";
-    value.textContent = `${percent} % within 1 px`;
-    value.title = "of the surface: no further from that of the volume before compression"
-        + (head.errors_are_stated ? ", if the errors are right that the file states" : "");
-    this.find(".facts").append(name, value);
+    this.find(".facts").append(...boundsElements(head));
   }
 
   list(selector, facts) {
@@ -237,28 +228,10 @@ class View {
     this.drawHistogram();
   }
 
-  /** Bars of log(1 + count); those that the surface encloses in the accent's colour. */
   drawHistogram() {
-    const canvas = this.find(".histogram canvas");
-    const ratio = devicePixelRatio;
-    const [width, height] = [canvas.clientWidth * ratio, canvas.clientHeight * ratio];
-    if (!this.histogram || !this.range || !(width > 0)) return;
-    Object.assign(canvas, { width, height });
-    const context = canvas.getContext("2d");
-    const { color, outlineColor } = getComputedStyle(canvas); // the bars', in this scheme
-    const { counts, range: [from, to] } = this.histogram;
-    const [low, high] = this.range;
-    const inset = (THUMB / 2) * ratio; // the thumb's middle goes from here to there
-    const x = (v) => Math.round(inset + ((v - low) / (high - low || 1)) * (width - 2 * inset));
-    const most = Math.log1p(Math.max(...counts, 1));
-    counts.forEach((count, i) => {
-      const [a, b] = [i, i + 1].map((k) => from + ((to - from) * k) / counts.length);
-      const bar = (Math.log1p(count) / most) * (height - ratio);
-      const inside = b > this.state.isovalue;
-      context.fillStyle = inside ? color : outlineColor;
-      context.globalAlpha = inside ? 0.55 : 1;
-      context.fillRect(x(a), height - bar, Math.max(1, x(b) - x(a)), bar);
-    });
+    if (!this.histogram || !this.range) return;
+    const { surfaces, selected } = this.state;
+    paintHistogram(this.find(".histogram canvas"), this.histogram, this.range, surfaces, selected);
   }
 
   // To the scene.
@@ -287,7 +260,7 @@ class View {
     const { width, height } = this.picture.getBoundingClientRect();
     if (!(width >= 1 && height >= 1)) return; // hidden: the observer pushes when it is not
     const ratio = Math.min(devicePixelRatio, MAX_PIXEL_RATIO);
-    const { background, color, clip, ...rest } = this.state;
+    const { clip, planes, camera, samples, caps } = this.state;
     this.wish += 1;
     this.answered = false;
     this.sentAt = performance.now();
@@ -298,10 +271,13 @@ class View {
       type: "wish",
       id: this.wish,
       size: [width, height].map((side) => clamp(Math.round(side * ratio), 1, 8192)),
-      color: toRgb(color),
+      camera,
+      samples,
       background: toRgb(this.backgroundShown()),
-      clip: clipPlanes(clip, this.volume.box),
-      ...rest,
+      clip: [...clipPlanes(clip, this.volume.box), ...planes],
+      caps,
+      ...lookOf(this.state),
+      ...wishedSurfaces(this.state),
     });
   }
 
@@ -314,6 +290,11 @@ class View {
     this.clearNote("error");
     this.showState();
     this.push();
+  }
+
+  /** The selected surface, which the slider moves. */
+  get surface() {
+    return this.state.surfaces[this.state.selected];
   }
 
   /** Moves the camera, but not to where it looks nowhere. */
@@ -334,16 +315,19 @@ class View {
 
   showState() {
     const { state } = this;
-    const value = Number.isFinite(state.isovalue) ? toText(state.isovalue) : "";
+    const { isovalue } = this.surface;
+    const value = Number.isFinite(isovalue) ? toText(isovalue) : "";
     this.set("isovalue", value);
-    this.field("slider").value = state.isovalue;
+    this.field("slider").value = isovalue;
     this.field("slider").setAttribute("aria-valuetext", value);
-    for (const name of ["color", "samples", "ambient", "by"]) this.field(name).value = state[name];
+    this.surfaces.show(state);
+    for (const name of ["samples", "ambient", "by"]) this.field(name).value = state[name];
     this.field("background").value = this.backgroundShown();
     this.set("max_error", state.max_error ?? "");
     this.set("time_budget", state.time_budget ?? "");
     this.clips.forEach((slider, i) => { slider.value = state.clip[i]; });
     this.field("caps").checked = state.caps;
+    this.look.show(state);
     this.drawHistogram();
   }
 
@@ -401,7 +385,7 @@ class View {
     this.listenToFields(on);
     on(matchMedia(DARK), "change", () => this.change({}));
     if (this.home.hash) {
-      on(window, "hashchange", () => this.change(readHash(location.hash)));
+      on(window, "hashchange", () => this.change(readHash(location.hash, this.state)));
     }
     const observer = new ResizeObserver(() => {
       this.drawHistogram();
@@ -492,19 +476,22 @@ class View {
       const value = field.value ? Number(field.value) : optional;
       if (field.validity.valid) this.change({ [name]: value });
     });
-    number("isovalue", "input");
     number("max_error", "change", null);
     number("time_budget", "change", null);
     on(this.field("by"), "change", (e) => this.change({ by: e.target.value }));
     number("samples", "change");
     number("ambient", "change");
-    on(this.field("slider"), "input", (e) => this.change({ isovalue: Number(e.target.value) }));
-    for (const name of ["color", "background"]) {
-      on(this.field(name), "input", (e) => this.change({ [name]: e.target.value }));
+    for (const name of ["isovalue", "slider"]) {
+      on(this.field(name), "input", ({ target }) => target.validity.valid
+        && this.surfaces.edit(this.state.selected, { isovalue: Number(target.value) }));
     }
+    on(this.field("background"), "input", (e) => this.change({ background: e.target.value }));
+    on(this.field("add"), "click", () => this.surfaces.add());
     this.clips.forEach((slider, i) => on(slider, "input", () =>
       this.change({ clip: moveClip(this.state.clip, i, Number(slider.value)) })));
     on(this.field("caps"), "change", (e) => this.change({ caps: e.target.checked }));
+    this.look.listen(on);
+    this.scenes.listen(on);
     on(this.find(".budget"), "submit", (e) => this.sendBudget(e));
     on(this.field("budget"), "change", (e) => this.sendBudget(e));
     on(this.find(".toggle"), "click", () => this.setOpen(this.find(".closed") !== null));
@@ -539,11 +526,7 @@ class View {
 
   download() {
     this.wantsShot = false;
-    const link = document.createElement("a");
-    link.href = URL.createObjectURL(this.lossless.blob);
-    link.download = `isowave_${toText(this.state.isovalue)}.png`;
-    link.click();
-    setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+    saveAs(this.lossless.blob, `isowave_${toText(this.surface.isovalue)}.png`);
   }
 
   cameraText() {

@@ -103,7 +103,8 @@ def show(volume: VolumeLike, *, height: int = 540, **options: Any) -> Widget:
 
     options  as for Scene
     """
-    key = (id(volume), *sorted(options.items()))
+    same = {**options, "field": id(options.get("field"))}
+    key = (id(volume), *sorted(same.items()))
     with _lock:
         scene, users = _scenes.get(key) or (Scene(volume, **options), 0)
         _scenes[key] = scene, users + 1

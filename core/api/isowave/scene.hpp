@@ -1,0 +1,85 @@
+#pragma once
+// Scenes: what is drawn, apart from how precisely; as values, and as files.
+//
+// A scene file is JSON:
+//
+//   {"isowave_scene": 1,
+//    "volume": "head.nrrd",
+//    "camera": {"eye": [0, 0, 500], "at": [0, 0, 0], "up": [0, 1, 0], "fovy_degrees": 60},
+//    "surfaces": [{"isovalue": 500, "color": "skin", "opacity": 0.3},
+//                 {"isovalue": 1150, "color": "#f0e8d8"}],
+//    "clip": [{"normal": [0, 0, -1], "offset": -60}],
+//    "background": "black"}
+//
+// Its keys are the fields of Scene and of Appearance, except `surface`. isowave_scene, surfaces,
+// each isovalue, each normal of a plane or slice, and eye and at of a camera are needed; for the
+// rest there are defaults. A colour is "#RRGGBB", a name of parse_color(), or red, green and blue
+// from 0 to 1.
+// A second volume colours the surface by its values with
+//
+//    "field": "temperature.nrrd", "color_map": "magma", "color_by_field": true
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "isowave/frame.hpp"
+
+namespace isowave {
+
+/// What is drawn. A frame needs a size and a camera beside it.
+struct Scene {
+  std::filesystem::path volume{};  ///< file of the volume; empty: not said
+  /// File of the second volume, for Appearance::color_by_field; empty: not said. `volume`: the
+  /// drawn volume itself (./volume is a file of that name).
+  std::filesystem::path field{};
+  std::optional<Camera> camera{};  ///< none: a view that the surfaces fill, Renderer::camera()
+  /// 1 to 8. One opaque surface is drawn as FrameRequest::isovalue, several as
+  /// FrameRequest::surfaces.
+  std::vector<Surface> surfaces{};
+  std::vector<Slice> slices{};    ///< as FrameRequest::slices
+  std::vector<ClipPlane> clip{};  ///< as FrameRequest::clip
+  bool caps = true;               ///< as FrameRequest::caps
+  Appearance appearance{};        ///< without `surface`: surfaces have colours of their own
+};
+
+/// Calls visit(name, field) for each field of a scene and its appearance, except `surface`. The
+/// names are the keys of scene files.
+///
+/// scene  a Scene, or a const one
+template <class AnyScene, class Visit>
+void for_each_scene_field(AnyScene &scene, const Visit &visit) {
+  visit("volume", scene.volume);
+  visit("field", scene.field);
+  visit("camera", scene.camera);
+  visit("surfaces", scene.surfaces);
+  visit("slices", scene.slices);
+  visit("clip", scene.clip);
+  visit("caps", scene.caps);
+  for_each_appearance_field(scene.appearance, visit);
+}
+
+/// The scene of a JSON text.
+///
+/// Throws  Error: what is wrong, and where: "surfaces[1].opacity"
+Scene parse_scene(std::string_view text);
+/// The text of a scene, without what has its default.
+///
+/// Throws  Error: as parse_scene()
+std::string scene_text(const Scene &scene);
+
+/// Reads a scene file. Relative paths of volume and field begin at the file's folder; the scene
+/// gets them as they are seen from the current folder.
+Scene read_scene(const std::filesystem::path &path);
+/// Writes a scene file. Relative paths of volume and field become relative to the file's folder. A
+/// file that exists is replaced when the new one is complete.
+void write_scene(const Scene &scene, const std::filesystem::path &path);
+
+/// A request that draws the scene. It has no size, and without Scene::camera no camera.
+FrameRequest scene_request(const Scene &scene);
+/// The scene that a request draws, without a volume and a field.
+Scene scene_of(const FrameRequest &request);
+
+}  // namespace isowave

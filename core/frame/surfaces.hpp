@@ -1,0 +1,74 @@
+#pragma once
+// Several surfaces of a frame, translucent ones, and slices. Rays go on from hits on translucent
+// surfaces, and their hits are blended front to back, in layers (kernels_cl/portable/layers.h).
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/frame/appearance.hpp"
+#include "core/view/clip.hpp"
+#include "kernels_cl/portable/layers.h"
+
+namespace isowave::core {
+
+/// An isosurface of a frame.
+struct SurfaceStyle {
+  float isovalue = 0;
+  glm::vec3 color{219 / 255.0f, 189 / 255.0f, 135 / 255.0f};  ///< display values, [0,1]
+  float opacity = 1;    ///< of each crossing, (0,1]; 1: nothing behind it is seen
+  bool clipped = true;  ///< false: clipping planes leave it whole
+};
+
+/// A plane that shows the voxels, by their values, without light.
+struct Slice {
+  ClipPlane plane{};    ///< the points p with dot(normal, p) = offset
+  float opacity = 1;    ///< (0,1]
+  bool clipped = true;  ///< false: clipping planes leave it whole
+};
+
+/// The slices of a frame. Voxels without data are not seen.
+struct Slices {
+  std::vector<Slice> planes{};
+  double low = 0, high = 1;  ///< voxel values of the first and the last colour
+  ColorTable colors{};
+};
+
+/// Throws  Error: more than ISO_MAX_SURFACES with the slices; two at one isovalue; an isovalue that
+///         is NaN; colours or opacities out of range; slices without a surface, whose plane is
+///         degenerate, or whose range of values is
+void check_surfaces(const std::vector<SurfaceStyle> &surfaces, const Slices &slices = {});
+
+/// The numbers of surfaces, those of larger isovalues first: the order in which layers prefer hits
+/// at one place.
+std::vector<std::uint32_t> innermost_first(const std::vector<SurfaceStyle> &surfaces);
+
+/// finest, view, camera  as make_clip_params()
+LayerParams make_layer_params(const std::vector<SurfaceStyle> &surfaces, const Slices &slices,
+                              const VolumeInfo &finest, const View &view, const Camera &camera);
+
+/// The picture of rays that have gone through layers, made on the host with the bits of a device's.
+///
+/// colors   [height * width] of the frame's rays
+/// samples  rays per pixel along each axis
+/// Returns  RGB, or RGBA if transparent
+Image8 shade_layers_scalar(const FrameParams &frame, const ShadeParams &params,
+                           std::span<const RayColor> colors, std::uint32_t samples = 1);
+
+/// Statistics of layers.
+struct LayerStats {
+  std::uint32_t layers = 0;  ///< layers that any ray has; 0: the frame has none
+  std::uint64_t hits = 0;    ///< in all of them
+  /// Rays that would go on behind their ISO_MAX_LAYERS-th hit. What they would hit there is left
+  /// out.
+  std::uint64_t rays_cut = 0;
+
+  /// Adds those of other rays.
+  void add(const LayerStats &other) {
+    layers = other.layers > layers ? other.layers : layers;
+    hits += other.hits;
+    rays_cut += other.rays_cut;
+  }
+};
+
+}  // namespace isowave::core

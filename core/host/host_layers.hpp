@@ -1,0 +1,229 @@
+#pragma once
+// Several surfaces, and what is seen through translucent ones (kernels_cl/portable/layers.h): rays
+// go on from their hits, ray by ray and in packets of eight. Only host_loops.cpp includes this
+// file.
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <span>
+
+#include "core/host/host_field.hpp"
+#include "core/host/host_packets.hpp"
+#include "core/host/host_rays.hpp"
+
+namespace isowave::core {
+
+/// A ray in the cell of its hit.
+inline CellWalk cell_of_hit(const FrameParams &frame, LastPlanes last, const Ray &ray,
+                            const HitRecord &hit) {
+  const BlockCoords b = block_coords(&frame, hit.block_id);
+  const int x = static_cast<int>(4 * b.x + (hit.cell & 3u)),
+            y = static_cast<int>(4 * b.y + (hit.cell >> 2 & 3u)),
+            z = static_cast<int>(4 * b.z + (hit.cell >> 4 & 3u));
+  const RayEvent begin = border_event(ray.begin_t), entry = region_entry(&ray, x, y, z, 1, last);
+  CellWalk at = start_at_cell(&ray, x, y, z, event_before(entry, begin) ? begin : entry, last);
+  if (passes_border(at.exit, ray.end_t)) at.exit = border_event(ray.end_t);
+  return at;
+}
+
+/// The next crossing of a surface in the cell of a hit on it that is a crossing.
+inline bool find_in_cell(const FrameParams &frame, const HostField &field, const Ray &ray,
+                         const CellWalk &at, const HitRecord &hit, HitRecord *next) {
+  const int x = at.cell.x, y = at.cell.y, z = at.cell.z;
+  field.open(level_block_at(&frame, static_cast<uint>(x) >> 2, static_cast<uint>(y) >> 2,
+                            static_cast<uint>(z) >> 2));
+  float w[8];
+  CellChange change;
+  load_corners(frame, field, x, y, z, w);
+  const uint number = crossings_up_to(hit);
+  if (!numbered_change_in_cell(&ray, w, x, y, z, at.enter, at.exit, number, 1, &change))
+    return false;
+  *next = make_hit(&frame, &ray, w, x, y, z, at.enter, at.exit,
+                   refine(kDefaultSolver, change.cubic, change.bracket));
+  next->cell |= number << ISO_CROSSING_BIT;
+  return true;
+}
+
+/// The first crossing of a ray behind a cell, `at`, of its way.
+inline bool walk_behind(const FrameParams &frame, const HostField &field, const ActiveBox &box,
+                        LastPlanes last, const Ray &ray, CellWalk at, HitRecord *next) {
+  if (at.exit.axis == ISO_AXIS_START) return false;
+  GridWalk block = at.block;
+  if (next_cell(&at, &ray, last) &&
+      trace_cells(frame, field, ray,
+                  level_block_at(&frame, static_cast<uint>(block.x), static_cast<uint>(block.y),
+                                 static_cast<uint>(block.z)),
+                  at, last, next))
+    return true;
+  RayEvent enter = walk_exit(&block, &ray);
+  if (passes_border(enter, ray.end_t)) return false;
+  GridWalk coarse = walk_from(&ray, block.x / ISO_MACROCELL_BLOCKS, block.y / ISO_MACROCELL_BLOCKS,
+                              block.z / ISO_MACROCELL_BLOCKS, kMacrocellVoxels, last);
+  if (!leaves(&block, &coarse, enter)) {
+    walk_step(&block, &ray, enter, 4, last);
+    const WalkEnd end = walk_blocks(frame, field, last, ray, coarse,
+                                    macrocell_mask(frame, field, coarse), block, &enter, next);
+    if (end != WalkEnd::kLeft) return end == WalkEnd::kHit;
+  }
+  walk_step(&coarse, &ray, enter, kMacrocellVoxels, last);
+  return walk_macrocells(frame, field, box, last, ray, coarse, enter, next);
+}
+
+/// The hit of a ray behind one that it has on the same surface, as the scalar twin finds it.
+///
+/// Returns  whether there is one
+inline bool trace_ray_behind(const HostLevel &surface, uint ray_id, const HitRecord &hit,
+                             HitRecord *next) {
+  const FrameParams &frame = surface.frame;
+  const LastPlanes last = last_planes(&frame);
+  const Ray ray = ray_of_level(surface, ray_id);
+  const ActiveBox box = active_box(frame.surface, last);
+  // A cap lies where the ray begins, maybe outside the box.
+  if (is_cap(hit)) return walk_ray(frame, surface.field, box, last, ray, next);
+  const CellWalk at = cell_of_hit(frame, last, ray, hit);
+  return find_in_cell(frame, surface.field, ray, at, hit, next) ||
+         walk_behind(frame, surface.field, box, last, ray, at, next);
+}
+
+/// The same within the cell of the hit, which is no cap.
+inline bool trace_ray_in_cell(const HostLevel &surface, uint ray_id, const HitRecord &hit,
+                              HitRecord *next) {
+  const Ray ray = ray_of_level(surface, ray_id);
+  const CellWalk at = cell_of_hit(surface.frame, last_planes(&surface.frame), ray, hit);
+  return find_in_cell(surface.frame, surface.field, ray, at, hit, next);
+}
+
+/// Eight rays of a frame on their way through layers: 4 columns and 2 rows from (x, y) on. Bits of
+/// lanes: column + 4 row.
+struct LayerPacket {
+  uint x, y, width;
+
+  uint ray_id(uint lane) const { return x + lane % 4 + width * (y + lane / 4); }
+};
+
+/// Finds the hits of rays behind those that they have on a surface.
+///
+/// hits  [8]; Out: next [8], of rays that have one
+template <auto kTraceRayBehind>
+inline void trace_rays_behind(const HostLevel &surface, const LayerPacket &packet, uint lanes,
+                              const HitRecord *hits, HitRecord *next) {
+  for (uint left = lanes; left != 0; left &= left - 1) {
+    const auto lane = static_cast<uint>(std::countr_zero(left));
+    kTraceRayBehind(surface, packet.ray_id(lane), hits[lane], next + lane);
+  }
+}
+
+#ifdef ISO_HAS_PACKETS
+/// The same: in the cells of the hits ray by ray, and behind them in packets.
+template <auto kTraceRayInCell, auto kTracePacket>
+inline void trace_packets_behind(const HostLevel &surface, const LayerPacket &packet, uint lanes,
+                                 const HitRecord *hits, HitRecord *next) {
+  uint behind = 0, capped = 0;
+  for (uint left = lanes; left != 0; left &= left - 1) {
+    const auto lane = static_cast<uint>(std::countr_zero(left));
+    if (is_cap(hits[lane])) {
+      capped |= 1u << lane;
+    } else if (!kTraceRayInCell(surface, packet.ray_id(lane), hits[lane], next + lane)) {
+      behind |= 1u << lane;
+    }
+  }
+  if ((behind | capped) != 0) kTracePacket(surface, packet.x, packet.y, behind, capped, hits, next);
+}
+#endif
+
+/// The value of the volume at a hit on a slice; 0 of another hit.
+inline float slice_value(const LayerBlend &by, const HostLevel &level, const HitRecord &hit) {
+  return is_of_slice(&by.colors, hit) ? value_at_hit(by.slice_map, level.frame, level.field, hit)
+                                      : 0.0f;
+}
+
+/// Blends the layers of some of eight rays. The other arguments are those of HostLoops::blend().
+///
+/// next  [lane] [surface] their first hits; overwritten
+template <auto kTraceBehind, auto kSmooth>
+inline uint blend_packet(std::span<const HostLevel> surfaces, const LayerBlend &by,
+                         const LayerPacket &packet, uint lanes, HitRecord *const *next,
+                         HitRecord *hits, RayColor *colors, LayerStats *stats) {
+  uint num_hits = 0;
+  for (uint left = lanes; left != 0; left &= left - 1)
+    colors[packet.ray_id(static_cast<uint>(std::countr_zero(left)))] = clear_ray();
+  HitRecord at[8], behind[8];
+  uint passed[8] = {};  // slices
+  for (uint layer = 0; lanes != 0; ++layer) {
+    uint on[ISO_MAX_SURFACES] = {};  // rays that go on behind a hit on that surface
+    uint on_behind_slices = 0;
+    for (uint left = lanes; left != 0; left &= left - 1) {
+      const auto lane = static_cast<uint>(std::countr_zero(left));
+      const uint ray_id = packet.ray_id(lane);
+      std::size_t nearest = 0;
+      for (std::size_t k = 1; k < surfaces.size(); ++k) {
+        if (next[lane][k].t < next[lane][nearest].t) nearest = k;
+      }
+      const HostLevel &surface = surfaces[nearest];
+      HitRecord hit = nearest_slice(&surface.frame, &by.clip, &by.colors, passed[lane], ray_id);
+      const bool is_slice = hit.t <= next[lane][nearest].t;
+      if (!is_slice) hit = at[lane] = next[lane][nearest];
+      if (hit.t == INFINITY) continue;
+      if (layer == ISO_MAX_LAYERS) {
+        ++stats->rays_cut;
+        continue;
+      }
+      if (!is_slice) {
+        if (by.is_smooth) kSmooth(surface, &hit);
+        hit = with_surface(hit, by.numbers[nearest]);
+        next[lane][nearest] = no_hit();
+      } else {
+        passed[lane] |= 1u << (surface_of(hit) - by.colors.num_surfaces);
+      }
+      const float value = slice_value(by, surface, hit);
+      colors[ray_id] = blend_hit(&surface.frame, &by.shading.params, by.shading.color_map.data(),
+                                 &by.colors, ray_id, hit, value, colors[ray_id]);
+      if (goes_on(colors[ray_id])) (is_slice ? on_behind_slices : on[nearest]) |= 1u << lane;
+      if (is_unseen(&by.colors, hit, value)) continue;
+      if (hits[ray_id].t == INFINITY) {
+        hits[ray_id] = hit;
+        ++num_hits;
+      }
+      ++stats->hits;
+      stats->layers = std::max(stats->layers, layer + 1);
+    }
+    lanes = on_behind_slices;
+    for (std::size_t k = 0; k < surfaces.size(); ++k) {
+      if (on[k] == 0) continue;
+      lanes |= on[k];
+      std::ranges::fill(behind, no_hit());
+      kTraceBehind(surfaces[k], packet, on[k], at, behind);
+      for (uint left = on[k]; left != 0; left &= left - 1) {
+        const auto lane = static_cast<uint>(std::countr_zero(left));
+        next[lane][k] = behind[lane];
+      }
+    }
+  }
+  return num_hits;
+}
+
+template <auto kTraceBehind, auto kSmooth>
+inline uint blend(std::span<const HostLevel> surfaces, const LayerBlend &by, const RayTile &tile,
+                  HitRecord *next, HitRecord *hits, RayColor *colors, LayerStats *stats) {
+  const uint columns = tile.end_x - tile.begin_x;
+  uint num_hits = 0;
+  for (uint y = tile.begin_y; y < tile.end_y; y += 2) {
+    for (uint x = tile.begin_x; x < tile.end_x; x += 4) {
+      HitRecord *of_lanes[8] = {};
+      uint lanes = 0;
+      for (uint lane = 0; lane < 8; ++lane) {
+        const uint column = x - tile.begin_x + lane % 4, row = y - tile.begin_y + lane / 4;
+        if (column >= columns || row >= tile.end_y - tile.begin_y) continue;
+        of_lanes[lane] = next + surfaces.size() * (column + columns * row);
+        lanes |= 1u << lane;
+      }
+      num_hits += blend_packet<kTraceBehind, kSmooth>(surfaces, by,
+                                                      {x, y, surfaces.front().frame.view.width},
+                                                      lanes, of_lanes, hits, colors, stats);
+    }
+  }
+  return num_hits;
+}
+
+}  // namespace isowave::core

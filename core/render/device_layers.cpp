@@ -1,0 +1,146 @@
+// DeviceRenderer's frames of several and translucent surfaces.
+
+#include <algorithm>
+#include <limits>
+
+#include "core/render/device_renderer.hpp"
+
+namespace isowave::core {
+
+namespace {
+
+/// The box around both; an empty one has no part in it.
+ScreenBox joined(const ScreenBox &a, const ScreenBox &b) {
+  if (a.end_x == 0) return b;
+  if (b.end_x == 0) return a;
+  return {std::min(a.begin_x, b.begin_x), std::min(a.begin_y, b.begin_y),
+          std::max(a.end_x, b.end_x), std::max(a.end_y, b.end_y)};
+}
+
+bool any_goes_on(const LayerCounts &counts) {
+  return std::ranges::any_of(counts.going_on, [](uint rays) { return rays != 0; });
+}
+
+}  // namespace
+
+/// Layer by layer: each ray's nearest hit of all surfaces gets its gradient and is blended. Rays
+/// that go on find the next hit of that surface.
+void DeviceRenderer::draw_layers(const FrameRequest &request, Frame &frame) {
+  const std::vector<std::uint32_t> order = innermost_first(request.surfaces);
+  std::vector<float> isovalues;
+  isovalues.reserve(order.size());
+  for (const std::uint32_t surface : order) isovalues.push_back(request.surfaces[surface].isovalue);
+  FrameStats &stats = frame.stats;
+  frame.waves_left = std::numeric_limits<std::uint32_t>::max();  // as many as it takes
+  last_view_.reset();
+  const VolumeInfo &finest = blocks_.levels[0].info;
+  layers_->open(
+      request.surfaces,
+      make_layer_params(request.surfaces, request.slices, finest, rays_.frame.view, request.camera),
+      make_shading(finest, request.light));
+  layers_->clear(rays_);
+  if (!request.slices.planes.empty()) rays_.field_values.fill(no_value());
+  has_layers_ = true;
+  const ClipParams clip = make_clip_params(finest, rays_.frame.view, request.camera, request.clip);
+  const std::size_t num_surfaces = find_first_hits(request, clip, isovalues, frame);
+  stats.rays_hit = 0;
+  for (std::uint32_t layer = 0;; ++layer) {
+    rays_.set_clip(clip);
+    const LayerCounts counts = draw_layer(layer, num_surfaces, request, frame);
+    stats.rays_hit += counts.first_hits;
+    if (layer == ISO_MAX_LAYERS) {
+      stats.layers.rays_cut = counts.hits;
+      break;
+    }
+    stats.layers.layers += counts.hits != 0 ? 1 : 0;
+    stats.layers.hits += counts.hits;
+    if (!any_goes_on(counts)) break;
+    find_hits_behind(request, clip, isovalues, counts, layer == 0, frame);
+    if (stats.cancelled) break;
+  }
+}
+
+FrameStats DeviceRenderer::render_layers(const FrameRequest &request,
+                                         std::vector<std::vector<RayHit>> &layers) {
+  const auto forget = [this](void *) { layer_hits_ = nullptr; };
+  layer_hits_ = &layers;
+  const std::unique_ptr<void, decltype(forget)> forgets(this, forget);
+  return render(request);
+}
+
+void DeviceRenderer::set_colors(std::span<const RayColor> colors) {
+  check_has_picture();
+  layers_->colors.write(colors);
+}
+
+/// Goes on with the surface at that place. clip: that of the frame.
+void DeviceRenderer::show_surface(const FrameRequest &request, const ClipParams &clip,
+                                  std::size_t place, float isovalue) {
+  rays_.set_clip(request.surfaces[layers_->surface_at(place)].clipped ? clip : ClipParams{});
+  blocks_.show_surface(rays_, place, isovalue);
+}
+
+/// Returns the number of surfaces that have hits: all, unless the frame is stopped.
+std::size_t DeviceRenderer::find_first_hits(const FrameRequest &request, const ClipParams &clip,
+                                            std::span<const float> isovalues, Frame &frame) {
+  ScreenBox screen{};
+  std::size_t num_surfaces = 0;
+  while (num_surfaces < isovalues.size() && !frame.stats.cancelled) {
+    const std::size_t place = num_surfaces++;
+    if (place != 0) show_surface(request, clip, place, isovalues[place]);
+    screen = joined(screen, rays_.frame.screen);
+    layers_->swap_hits(rays_, place);
+    finds_first_of_ = place;
+    run(*camera_rays_, frame);
+    finds_first_of_.reset();
+    layers_->swap_hits(rays_, place);
+  }
+  const View &view = rays_.frame.view;
+  layers_screen_ =
+      request.slices.planes.empty() ? screen : ScreenBox{0, 0, view.width, view.height};
+  return num_surfaces;
+}
+
+/// Behind the last layer that is drawn, hits are counted alone.
+LayerCounts DeviceRenderer::draw_layer(std::uint32_t layer, std::size_t num_surfaces,
+                                       const FrameRequest &request, Frame &frame) {
+  const bool is_further = layer != 0, is_drawn = layer < ISO_MAX_LAYERS;
+  if (is_further) layers_->swap_layer(rays_);
+  is_in_further_layer_ = is_further;
+  layers_->choose(rays_, num_surfaces, !is_further);
+  rays_.frame.screen = layers_screen_;
+  if (is_drawn && !request.slices.planes.empty()) {
+    slice_values_->set_layer(!is_further, static_cast<std::uint32_t>(request.surfaces.size()));
+    run(*slice_values_, frame);
+    if (frame.stats.cancelled) rays_.field_values.fill(no_value());
+  }
+  if (is_drawn && request.normals == Normals::kSmooth) {
+    const bool previews = !is_further && frame.on_pass;
+    if (previews) layers_->blend(rays_, true, ISO_PREVIEWS);
+    run(is_further ? static_cast<Wave &>(*layer_normals_) : normals_of_camera_, frame);
+    if (previews) layers_->clear(rays_);
+  }
+  const LayerCounts counts =
+      layers_->blend(rays_, !is_further, is_drawn ? ISO_BLENDS : ISO_COUNTS_ALONE);
+  if (layer_hits_ != nullptr) layer_hits_->push_back(layers_->read(rays_, !is_further));
+  layers_->next_layer();
+  is_in_further_layer_ = false;
+  if (is_further) layers_->swap_layer(rays_);
+  return counts;
+}
+
+void DeviceRenderer::find_hits_behind(const FrameRequest &request, const ClipParams &clip,
+                                      std::span<const float> isovalues, const LayerCounts &counts,
+                                      bool is_first_layer, Frame &frame) {
+  for (std::size_t place = 0; place < isovalues.size() && !frame.stats.cancelled; ++place) {
+    if (counts.going_on[layers_->surface_at(place)] == 0) continue;
+    show_surface(request, clip, place, isovalues[place]);
+    behind_->set_surface(is_first_layer, place);
+    finds_behind_of_ = place;
+    run(*behind_, frame);
+    finds_behind_of_.reset();
+    layers_->swap_hits(rays_, place);
+  }
+}
+
+}  // namespace isowave::core

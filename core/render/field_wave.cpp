@@ -1,0 +1,71 @@
+#include "core/render/field_wave.hpp"
+
+#include <limits>
+#include <utility>
+
+#include "core/frame/field_values.hpp"
+
+namespace isowave::core {
+
+namespace {
+
+DeviceStream make_stream(ocl::Device &device, const CompressedVolume &field,
+                         const FieldPlan &plan) {
+  return plan.stream == StreamPlace::kHost ? DeviceStream(device, field, OnHost{plan.window_blocks})
+                                           : DeviceStream(device, field, plan.largest_stream_part);
+}
+
+}  // namespace
+
+FieldWave::FieldWave(ocl::Device &device, const CompressedVolume &field,
+                     std::span<const VolumeInfo> levels, const FieldPlan &plan,
+                     std::uint32_t group_size, Wavefront &rays)
+    : blocks_(device, field, make_stream(device, field, plan), plan.cache, group_size),
+      grid_(make_grid_params(field.info)),
+      map_(make_field_map(levels, field.info)),
+      values_(device, rays.num_rays, group_size, plan.cache.slot_type),
+      rays_(rays) {
+  blocks_.drawing = {0, 1};
+  values_.set_map(map_);
+}
+
+void FieldWave::begin_frame(bool has_values, bool on_caps) {
+  map_.caps_alone = on_caps ? 1 : 0;
+  values_.set_map(map_);
+  if (has_values) rays_.field_values.fill(no_value());
+  if (!blocks_.has_requests()) return;
+  blocks_.cache.requested_bits.fill(0);
+  blocks_.forget_requests();
+  rays_.forget_rays();
+}
+
+void FieldWave::enqueue_pass() {
+  rays_.open_pass();
+  const FrameParams of_volume = rays_.frame;
+  const std::uint32_t num_levels = std::exchange(rays_.num_level_frames, 1);
+  FrameParams &frame = blocks_.levels[0].frame;
+  frame = of_volume;
+  frame.grid = grid_.grid;
+  frame.place = grid_.place;
+  frame.brick = grid_.brick;
+  frame.surface = grid_.surface;
+  frame.schedule.table_groups = blocks_.cache.table_groups;
+  rays_.frame = frame;
+  // Stages of the cache read the grid of rays_.frame.
+  struct PutBack {
+    Wavefront &rays;
+    const FrameParams &frame;
+    std::uint32_t num_levels;
+    ~PutBack() {
+      rays.frame = frame;
+      rays.num_level_frames = num_levels;
+    }
+  } const put_back{rays_, of_volume, num_levels};
+  if (!begins_) blocks_.provide(rays_);
+  const auto stage = blocks_.device.timer().stage("field");
+  values_(frame, blocks_.cache, rays_, begins_);
+  begins_ = false;
+  blocks_.expect_requests();
+}
+
+}  // namespace isowave::core

@@ -1,0 +1,51 @@
+#pragma once
+// A second volume on a device, the field, and the wave in which hits get its values.
+
+#include <array>
+#include <optional>
+#include <span>
+
+#include "core/render/block_store.hpp"
+#include "core/render/wave.hpp"
+#include "core/stages/field_values.hpp"
+
+namespace isowave::core {
+
+class FieldWave : public Wave {
+ public:
+  /// Uploads the field, unless it stays on the host.
+  ///
+  /// field   must outlive the wave if it stays on the host
+  /// levels  of the volume that is drawn
+  /// rays    must outlive the wave
+  /// Throws  Error: not enough memory on the device
+  /// Waits   yes
+  FieldWave(ocl::Device &device, const CompressedVolume &field, std::span<const VolumeInfo> levels,
+            const FieldPlan &plan, std::uint32_t group_size, Wavefront &rays);
+
+  /// A frame begins, which has no values yet.
+  ///
+  /// Waits  if a frame before was stopped
+  void begin_frame(bool has_values, bool on_caps);
+  void begin() override { begins_ = true; }
+  void enqueue_pass() override;
+  BlockStore *own_blocks() override { return &blocks_; }
+  LaterPasses *sum_in(FrameStats &stats) const override { return &stats.field; }
+
+  /// Forgets all blocks of the field that are decoded.
+  void clear() { blocks_.clear(); }
+  /// As FieldValues::range().
+  std::optional<std::array<float, 2>> range(std::size_t num_rays) {
+    return values_.range(rays_, num_rays);
+  }
+
+ private:
+  BlockStore blocks_;
+  FrameParams grid_;
+  FieldMap map_;
+  FieldValues values_;
+  Wavefront &rays_;
+  bool begins_ = false;  ///< the next pass is the first
+};
+
+}  // namespace isowave::core

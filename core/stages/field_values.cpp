@@ -1,0 +1,43 @@
+#include "core/stages/field_values.hpp"
+
+#include <cstring>
+
+namespace isowave::core {
+
+FieldValues::FieldValues(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_size,
+                         SlotType slots)
+    : device_(device),
+      range_of_hits_(
+          ocl::Range::strided(num_pixels, group_size, device, 4).in_parts(num_pixels, device)),
+      map_(device, sizes()["map of a field"]),
+      range_(device, sizes()["range of field values"]),
+      kernel_(device, with_slots(group_defines(group_size), slots)),
+      range_kernel_(device, with_slots(group_defines(group_size), slots)) {}
+
+void FieldValues::set_map(const FieldMap &map) {
+  if (map_on_device_ && std::memcmp(&*map_on_device_, &map, sizeof(map)) == 0) return;
+  map_.write({&map, 1});
+  map_on_device_ = map;
+}
+
+void FieldValues::operator()(const FrameParams &frame, BlockCache &cache, Wavefront &rays,
+                             bool begins) {
+  kernel_(range_of_hits_, frame, map_, range_of_hits_.parts, begins ? 1u : 0u, cache.table,
+          cache.values, rays.previous_counts, rays.counts, rays.next_counts, rays.active_ray_ids,
+          rays.next_active_ray_ids, rays.hits, rays.field_values, cache.slot_stamps,
+          cache.requested_bits, cache.request_block_ids, cache.capacity, cache.state);
+}
+
+std::optional<std::array<float, 2>> FieldValues::range(const Wavefront &rays,
+                                                       std::size_t num_rays) {
+  const std::array<uint, 2> none{0xFFFFFFFFu, 0};
+  range_.write(none);
+  range_kernel_(ocl::Range::strided(num_rays, ocl::kGroupSize, device_),
+                static_cast<uint>(num_rays), rays.field_values, range_);
+  std::array<uint, 2> keys{};
+  range_.read(keys);
+  if (keys == none) return {};
+  return {{value_of_key(keys[0]), value_of_key(keys[1])}};
+}
+
+}  // namespace isowave::core

@@ -1,0 +1,54 @@
+/// found_slots.h -- the cached ones of 2^3 blocks, and the voxels in them. OpenCL C 1.2.
+#ifndef ISOWAVE_FOUND_SLOTS_H
+#define ISOWAVE_FOUND_SLOTS_H
+
+#include "portable/block_table.h"
+#include "slot_values.h"
+#include "work_group.h"
+
+/// Looks for those of the 2^3 blocks from `base` on whose bits (corner x + 2y + 4z) are set in
+/// `wanted`. Returns which of them are cached, and their places in slots [8], ISO_GROUP_SIZE apart.
+/// All are read before one is looked at: a GPU waits once.
+ISO_INLINE uint find_slots(const FrameParams *frame, global const BlockEntry *table,
+                           BlockCoords base, uint wanted, local uint *slots) {
+  uint keys[8], found[8], have = 0;
+  ISO_UNROLL
+  for (uint corner = 0; corner < 8; ++corner) {
+    keys[corner] = ISO_INVALID_ID;
+    found[corner] = ISO_BLOCK_ABSENT;
+    if ((wanted >> corner & 1u) != 0) {
+      const uint home = table_home(frame, base.x + (corner & 1), base.y + (corner >> 1 & 1),
+                                   base.z + (corner >> 2));
+      keys[corner] = table[home].block_id;
+      found[corner] = table[home].slot;
+    }
+  }
+  ISO_UNROLL
+  for (uint corner = 0; corner < 8; ++corner) {
+    const uint x = base.x + (corner & 1), y = base.y + (corner >> 1 & 1),
+               z = base.z + (corner >> 2);
+    uint slot = found[corner];
+    if (keys[corner] != ISO_INVALID_ID && keys[corner] != block_id_at(frame, x, y, z))
+      slot = cached_slot(frame, table, x, y, z);
+    slots[corner * ISO_GROUP_SIZE] = slot;
+    have |= (uint)(slot != ISO_BLOCK_ABSENT) << corner;
+  }
+  return have;
+}
+
+/// The voxels of a stencil in the cache: in slots [8] of the blocks from `base` on, ISO_GROUP_SIZE
+/// apart.
+typedef struct CachedStencil {
+  global const SlotValue *values;
+  local const uint *slots;
+  BlockCoords base;
+} CachedStencil;
+
+ISO_INLINE float stencil_voxel(const CachedStencil *cached, int x, int y, int z) {
+  const uint vx = (uint)x - 4 * cached->base.x, vy = (uint)y - 4 * cached->base.y,
+             vz = (uint)z - 4 * cached->base.z;
+  const uint slot = cached->slots[((vx >> 2) + 2 * (vy >> 2) + 4 * (vz >> 2)) * ISO_GROUP_SIZE];
+  return cached->values[slot * ISO_BLOCK_VOXELS + (vx & 3) + 4 * (vy & 3) + 16 * (vz & 3)];
+}
+
+#endif

@@ -1,0 +1,131 @@
+/// field_value.h -- the value of another volume, the field, at a hit: trilinear between the eight
+/// voxels around it. Portable: OpenCL C 1.2 and C++.
+///
+/// Hits outside the field's grid, or in a cell with a corner without data, have no value: NaN.
+#ifndef ISOWAVE_FIELD_VALUE_H
+#define ISOWAVE_FIELD_VALUE_H
+
+#include "cell_intersect.h"
+#include "no_data.h"
+#include "smooth_gradient.h"
+
+ISO_NAMESPACE_BEGIN
+
+#define ISO_FIELD_LEVELS 16u  ///< of detail, of the volume that is drawn
+/// Hits so far outside the grid count as at its border [voxels of the field]: the same border may
+/// be rounded to one side or the other.
+#define ISO_FIELD_REACH 0.00390625f
+
+/// From a hit's cell to the index space of the field.
+typedef struct FieldMap {
+  float rows[12];                  ///< row-major 3 x 4, from the finest level's index space
+  uint dims[3];                    ///< of the field [voxels]
+  uint blocks_x, blocks_y;         ///< blocks of the finest level
+  uint num_levels;                 ///< levels that may have hits
+  uint caps_alone;                 ///< 0 or 1: hits that are no caps have no value
+  uint first_surface;              ///< hits of surfaces of lower numbers have no value
+  uint begin_z[ISO_FIELD_LEVELS];  ///< see LevelPlace
+} FieldMap;
+ISO_CHECK_SIZE(FieldMap, 144);
+
+/// The place of a hit in the field.
+typedef struct FieldPlace {
+  int x, y, z;   ///< cell; -1: outside
+  CellPoint at;  ///< in the cell
+} FieldPlace;
+
+/// A NaN with the same bits everywhere, unlike NAN.
+ISO_INLINE float no_value(void) {
+#ifdef __OPENCL_C_VERSION__
+  return as_float(0x7FC00000u);
+#else
+  return std::bit_cast<float>(0x7FC00000u);
+#endif
+}
+
+/// Bits whose order is that of the values, and back.
+ISO_INLINE uint field_key(float value) {
+#ifdef __OPENCL_C_VERSION__
+  const uint bits = as_uint(value);
+#else
+  const uint bits = std::bit_cast<uint>(value);
+#endif
+  return (bits & 0x80000000u) != 0 ? ~bits : bits | 0x80000000u;
+}
+ISO_INLINE float value_of_key(uint key) {
+  const uint bits = (key & 0x80000000u) != 0 ? key & 0x7FFFFFFFu : ~key;
+#ifdef __OPENCL_C_VERSION__
+  return as_float(bits);
+#else
+  return std::bit_cast<float>(bits);
+#endif
+}
+
+/// The cell along an axis, or -1. at: Out, the place in the cell, [0,1]
+ISO_INLINE int field_cell(float p, uint dims, float *at) {
+  const float last = (float)(dims - 1u);
+  int cell;
+  if (!(p >= -ISO_FIELD_REACH && p <= last + ISO_FIELD_REACH)) return -1;
+  p = p > 0.0f ? (p < last ? p : last) : 0.0f;
+  cell = (int)p;
+  if (cell > (int)dims - 2) cell = (int)dims - 2;
+  *at = p - (float)cell;
+  return cell;
+}
+
+/// hit: its block's id is that of a frame of any levels of detail.
+ISO_INLINE FieldPlace field_place(ISO_GLOBAL const FieldMap *m, HitRecord hit) {
+  FieldPlace place = {-1, -1, -1, {0.0f, 0.0f, 0.0f}};
+  const uint layer = hit.block_id / m->blocks_x / m->blocks_y;
+  uint level = 0;
+  float x, y, z, scale;
+  if (hit.t == INFINITY || (m->caps_alone && (hit.cell & ISO_CAP) == 0) ||
+      hit.cell >> ISO_SURFACE_BIT < m->first_surface)
+    return place;
+  while (level + 1 < m->num_levels && m->begin_z[level + 1] <= layer) ++level;
+  /* Voxel k of a level lies where voxel 2k of the finer one does. */
+  scale = (float)(1u << level);
+  x = scale * ((float)(4 * (hit.block_id % m->blocks_x) + (hit.cell & 3u)) + hit.x);
+  y = scale *
+      ((float)(4 * (hit.block_id / m->blocks_x % m->blocks_y) + (hit.cell >> 2 & 3u)) + hit.y);
+  z = scale * ((float)(4 * (layer - m->begin_z[level]) + (hit.cell >> 4 & 3u)) + hit.z);
+  place.x = field_cell(fma(m->rows[0], x, fma(m->rows[1], y, fma(m->rows[2], z, m->rows[3]))),
+                       m->dims[0], &place.at.x);
+  place.y = field_cell(fma(m->rows[4], x, fma(m->rows[5], y, fma(m->rows[6], z, m->rows[7]))),
+                       m->dims[1], &place.at.y);
+  place.z = field_cell(fma(m->rows[8], x, fma(m->rows[9], y, fma(m->rows[10], z, m->rows[11]))),
+                       m->dims[2], &place.at.z);
+  return place;
+}
+
+ISO_INLINE int is_in_field(FieldPlace place) {
+  return place.x >= 0 && place.y >= 0 && place.z >= 0;
+}
+
+/// The block of the cell's lowest corner, in the field.
+ISO_INLINE BlockCoords field_base(FieldPlace place) {
+  BlockCoords base;
+  base.x = (uint)place.x >> 2;
+  base.y = (uint)place.y >> 2;
+  base.z = (uint)place.z >> 2;
+  return base;
+}
+
+/// The blocks of the cell's corners, bits 0..7: corner x + 2y + 4z is field_base() + (x,y,z).
+ISO_INLINE uint field_blocks(FieldPlace place) {
+  const BlockCoords base = field_base(place);
+  return corners_of(blocks_of_voxels(place.x, place.x + 1, base.x),
+                    blocks_of_voxels(place.y, place.y + 1, base.y),
+                    blocks_of_voxels(place.z, place.z + 1, base.z));
+}
+
+/// v [8]: the cell's corners, x + 2y + 4z.
+ISO_INLINE float field_value(const float *v, CellPoint at) {
+  if (lacks_data(v)) return no_value();
+  return without_zero_sign(lerp(at.z, lerp(at.y, lerp(at.x, v[0], v[1]), lerp(at.x, v[2], v[3])),
+                                lerp(at.y, lerp(at.x, v[4], v[5]), lerp(at.x, v[6], v[7]))));
+}
+
+ISO_NAMESPACE_END
+
+#endif

@@ -1,0 +1,32 @@
+#pragma once
+// The twin of values of a field at hits: the same portable header as the kernels, in a plain loop
+// over voxels that libzfp has decoded.
+
+#include <span>
+#include <vector>
+
+#include "core/zfp/zfp_stream.hpp"
+#include "kernels_cl/portable/field_value.h"
+
+namespace isowave::core {
+
+/// The value at a hit of voxels, x fastest; NaN: it has none.
+float value_at_hit(const FieldMap &map, const glm::uvec3 &dims, std::span<const float> voxels,
+                   const HitRecord &hit);
+
+class FieldTwin {
+ public:
+  /// Decodes the field.
+  explicit FieldTwin(const CompressedVolume &field);
+
+  /// levels   of the volume that has the hits, the finest first
+  /// Returns  [hit] NaN: it has no value
+  std::vector<float> values(std::span<const VolumeInfo> levels, std::span<const HitRecord> hits,
+                            bool on_caps = false) const;
+
+ private:
+  VolumeInfo info_;
+  std::vector<float> voxels_;
+};
+
+}  // namespace isowave::core

@@ -1,0 +1,117 @@
+// `isowave render --color-by`, run as a user runs it.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "core/io/png.hpp"
+#include "tests/run_program.hpp"
+
+namespace isowave::core {
+namespace {
+
+using test::expect_one_line_error;
+using test::quoted;
+
+const std::string kVolume = ISOWAVE_TEST_DATA "/head_41x41x41_uint8.raw.gz";
+const std::string kHead = kVolume + " -i 80 --size 48x36 ";
+
+class CliColorBy : public testing::Test {
+ protected:
+  /// The bytes of a picture.
+  std::string draw(const std::string &options) const {
+    const auto path = folder_ / "a.png";
+    const auto result = test::run_isowave("render " + kHead + options + " -o " + quoted(path));
+    EXPECT_EQ(result.status, 0) << options << "\n" << result.err;
+    return test::read_file(path);
+  }
+
+  test::TemporaryFolder folder_;
+};
+
+TEST_F(CliColorBy, AxesAndMapsMakeDifferentPictures) {
+  std::set<std::string> pictures{draw("")};
+  const std::vector<std::string> options{
+      "x", "y", "z", "1,1,0", "z,0,20", "z,20,0", "z --color-map magma", "z --color-map coolwarm"};
+  for (const std::string &option : options) pictures.insert(draw("--color-by " + option));
+  EXPECT_EQ(pictures.size(), 1 + options.size());
+  EXPECT_EQ(draw("--color-by 0,0,3"), draw("--color-by z"));
+  EXPECT_EQ(draw("--color-by z,0,40"), draw("--color-by z"));  // the volume's box
+}
+
+TEST_F(CliColorBy, AllRenderersDrawTheSameBytes) {
+  for (const std::string &more : {std::string(), std::string(" --samples 2 --clip 1,0,0.2"),
+                                  std::string(" --transparent --parallel")}) {
+    const std::string host = draw("--device host --color-by 1,0,2" + more);
+    EXPECT_EQ(draw("--device cpu --color-by 1,0,2" + more), host) << more;
+    EXPECT_EQ(draw("--reference --color-by 1,0,2" + more), host) << more;
+  }
+}
+
+TEST_F(CliColorBy, AFieldColoursTheSurface) {
+  const std::string small = "'" + (folder_ / "field.zfp").string() + "'";
+  const auto made = test::run_isowave("convert " + kVolume + " -o " + small);
+  ASSERT_EQ(made.status, 0) << made.err;
+  std::set<std::string> pictures{draw(""), draw("--color-by z")};
+  const std::vector<std::string> options{"--color-by " + small, "--color-by " + small + ",0,300",
+                                         "--color-by volume --clip=-1,0,0,-20",
+                                         "--color-by volume,0,90 --clip=-1,0,0,-20"};
+  for (const std::string &option : options) {
+    const std::string more = " " + option;
+    const std::string host = draw("--device host" + more);
+    EXPECT_EQ(draw("--device cpu" + more), host) << more;
+    EXPECT_EQ(draw("--reference" + more), host) << more;
+    pictures.insert(host);
+  }
+  EXPECT_EQ(pictures.size(), 6u);
+  const auto result = test::run_isowave(
+      "render " + kHead + "--color-by volume --clip=-1,0,0,-20 -o " + quoted(folder_ / "a.png"));
+  EXPECT_THAT(result.out, testing::HasSubstr("values of the field at the hits: "));
+  EXPECT_EQ(draw("--color-by volume"), draw("")) << "there are no caps";
+  EXPECT_EQ(draw("--color-by volume --color red"), draw("--color red"));
+}
+
+TEST_F(CliColorBy, AnAxisStaysOneIfAFileHasItsName) {
+  const std::string axis = draw("--color-by z");
+  const std::filesystem::path before = std::filesystem::current_path();
+  std::filesystem::current_path(folder_.path());
+  std::ofstream("z") << "no volume";
+  EXPECT_EQ(draw("--color-by z"), axis);
+  EXPECT_EQ(draw("--color-by z,0,40"), axis);
+  const auto of_file = test::run_isowave("render " + kHead + "--color-by ./z");
+  EXPECT_EQ(of_file.status, 1);
+  EXPECT_THAT(of_file.err, testing::HasSubstr("./z: unknown kind of volume"));
+  std::filesystem::current_path(before);
+}
+
+TEST_F(CliColorBy, StatisticsTellOfIt) {
+  draw("--color-by z,1,2 --color-map gray --stats " + quoted(folder_ / "s.json"));
+  const auto options =
+      nlohmann::json::parse(test::read_file(folder_ / "s.json"))["options"]["color_by"];
+  EXPECT_EQ(options["axis"], "z,1,2");
+  EXPECT_EQ(options["map"], "gray");
+}
+
+TEST_F(CliColorBy, WhatItCannotMeanIsRefused) {
+  for (const char *bad : {"w", "1,2", "x,1", "x,1,2,3", "1,2,3,4", "z,a,b", "zz", ""})
+    expect_one_line_error("render " + kHead + "--color-by '" + bad + "'", "--color-by");
+  expect_one_line_error("render " + kHead + "--color-by 0,0,0", "direction");
+  expect_one_line_error("render " + kHead + "--color-by z,3,3", "two numbers that differ");
+  expect_one_line_error("render " + kHead + "--color-by z --color-map jet", "jet");
+  expect_one_line_error("render " + kHead + "--color-map magma", "--color-by");
+  expect_one_line_error("render " + kHead + "--color-by volume,1", "--color-by");
+  expect_one_line_error("render " + kHead + "--color-by volume,1,1", "two numbers that differ");
+  expect_one_line_error("render " + kHead + "--color-by missing.nrrd", "volume or a file");
+  expect_one_line_error("render " + kHead + "--color-by volume --time-budget 9", "--time-budget");
+  expect_one_line_error("render " + kVolume + " --surface 80,bone --color-by volume", "--surface");
+  expect_one_line_error("render " + kHead + "--color-by z --color '#102030'", "--color");
+}
+
+}  // namespace
+}  // namespace isowave::core

@@ -1,0 +1,55 @@
+// Annotations of pictures, as dicts.
+
+#include <array>
+#include <optional>
+
+#include "module.hpp"
+#include "requests.hpp"
+
+namespace isowave_python {
+
+namespace {
+
+nb::dict dict_of(const isowave::AnnotationGroup &group) {
+  nb::list boxes, strokes, texts;
+  for (const auto &[begin, end, color] : group.boxes)
+    boxes.append(nb::make_tuple(begin, end, color));
+  for (const auto &[points, width, color] : group.strokes)
+    strokes.append(nb::make_tuple(points, width, color));
+  for (const auto &[place, anchor, size, text, color] : group.texts)
+    texts.append(nb::make_tuple(place, anchor, size, text, color));
+  nb::dict result;
+  result["begin"] = group.begin;
+  result["end"] = group.end;
+  result["boxes"] = boxes;
+  result["strokes"] = strokes;
+  result["texts"] = texts;
+  result["halo"] = group.halo;
+  result["halo_color"] = group.halo_color;
+  return result;
+}
+
+nb::list annotation_layout(const nb::dict &wanted, const nb::dict &request,
+                           const std::optional<std::array<double, 2>> &color_range) {
+  isowave::Annotations annotations;
+  const auto get = reader_of(wanted);
+  get("scale_bar", annotations.scale_bar);
+  get("axes", annotations.axes);
+  get("color_bar", annotations.color_bar);
+  get("caption", annotations.caption);
+  get("units", annotations.units);
+  get("title", annotations.title);
+  nb::list result;
+  for (const isowave::AnnotationGroup &group :
+       isowave::annotation_layout(annotations, request_of(request), color_range))
+    result.append(dict_of(group));
+  return result;
+}
+
+}  // namespace
+
+void add_annotations(nb::module_ &m) {
+  m.def("annotation_layout", &annotation_layout, "wanted"_a, "request"_a, "color_range"_a.none());
+}
+
+}  // namespace isowave_python

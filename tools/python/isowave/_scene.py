@@ -1,0 +1,198 @@
+"""Scenes: what is drawn of a volume, put together step by step, and as files."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+from isowave import _core
+from isowave._camera import Camera, vector
+from isowave._checked import Isovalue, number
+from isowave._clip import ClipPlane, clip_of
+from isowave._color_map import ColorMap, color_map_for_core, color_map_of
+from isowave._image import Image
+from isowave._levels import Voxels
+from isowave._request import camera_for_core, camera_of, lights_of, optional_color
+from isowave._slice import Slice, slice_map_for_core, slice_map_of, slices_of
+from isowave._surface import Color, Surface, surfaces_of
+
+
+#: Fields of a Scene that are colours and lights, and arguments of Volume.render().
+LOOK = (
+    "color_map",
+    "slice_map",
+    "field",
+    "background",
+    "background_top",
+    "transparent",
+    "lights",
+    "light",
+    "shadow_rays",
+    "light_angle",
+)
+
+
+class SceneVolume(Protocol):
+    """What scenes need of a Volume."""
+
+    def _isovalue(self, isovalue: Isovalue) -> float:
+        ...
+
+    def camera(self, *args: Any, **more: Any) -> Camera:
+        ...
+
+    def render(self, *args: Any, **more: Any) -> Image:
+        ...
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What is drawn of a volume; Volume.scene() makes an empty one, open_scene() reads a file.
+
+        scene = volume.scene().surface(500, "skin", opacity=0.3).surface(1150, "bone")
+        image = scene.clip(isowave.ClipPlane((0, 0, -1), -60)).render(size=(1280, 720))
+        scene.save("head.json", volume="head.nrrd")  # for `isowave render --scene head.json`
+
+    A scene cannot be changed: each method returns another one.
+    """
+
+    volume: SceneVolume
+    surfaces: tuple[Surface, ...] = ()
+    slices: tuple[Slice, ...] = ()
+    planes: tuple[ClipPlane, ...] = ()  #: clipping planes
+    caps: bool = True  #: as the argument of Volume.render(), and the next ten
+    slice_map: ColorMap | str = "gray"
+    color_map: ColorMap | str | None = None
+    background: Color | None = None
+    background_top: Color | None = None
+    transparent: bool = False
+    lights: Mapping[str, float] | None = None
+    light: Sequence[float] | None = None
+    shadow_rays: int = 0
+    light_angle: float = 3.0
+    field: Voxels | None = None
+    view: Camera | None = None  #: None: a view that the surfaces fill
+
+    def surface(
+        self,
+        isovalue: Isovalue,
+        color: Color | None = None,
+        opacity: float = 1.0,
+        *,
+        clipped: bool = True,
+    ) -> Scene:
+        """The scene with one more surface, up to 8; arguments as Surface.
+
+        isovalue: "auto" is the first of Volume.suggested_isovalues().
+        """
+        more = Surface(self.volume._isovalue(isovalue), color, opacity, clipped)
+        return replace(self, surfaces=(*self.surfaces, more))
+
+    def slice(
+        self,
+        normal: str | Sequence[float],
+        offset: float = 0.0,
+        opacity: float = 1.0,
+        *,
+        clipped: bool = True,
+    ) -> Scene:
+        """The scene with one more slice; arguments as Slice, whose colours are slice_map's."""
+        return replace(self, slices=(*self.slices, Slice(normal, offset, opacity, clipped)))
+
+    def clip(self, planes: ClipPlane | Sequence[ClipPlane], *, caps: bool = True) -> Scene:
+        """The scene with one more clipping plane, or several such as those of clip_box()."""
+        more = (planes,) if isinstance(planes, ClipPlane) else planes
+        return replace(self, planes=(*self.planes, *more), caps=caps)
+
+    def seen_from(self, camera: Camera | None) -> Scene:
+        """The scene with another view; None: one that the surfaces fill."""
+        return replace(self, view=camera)
+
+    def look(self, **fields: Any) -> Scene:
+        """The scene with other colours and lights: fields by their names."""
+        unknown = {*fields} - {*LOOK}
+        if unknown:
+            raise TypeError(f"look() has no argument {', '.join(sorted(unknown))}")
+        return replace(self, **fields)
+
+    def camera(self, **more: Any) -> Camera:
+        """A view that the surfaces fill; arguments as Volume.camera()."""
+        return self.volume.camera(surfaces=self.surfaces, **more)
+
+    def render(self, **more: Any) -> Image:
+        """Draws the scene; arguments as Volume.render(), which replace those of the scene."""
+        arguments: dict[str, Any] = {
+            "slices": self.slices,
+            "clip": self.planes,
+            "caps": self.caps,
+            "camera": self.view,
+            **{name: getattr(self, name) for name in LOOK},
+        }
+        first = self.surfaces[0] if len(self.surfaces) == 1 else None
+        if first is not None and first.opacity == 1 and first.clipped:
+            # One opaque surface is drawn with whatever Renderer.render() offers.
+            arguments["isovalue"] = first.isovalue
+            color_map = color_map_of(self.color_map)
+            by_axis = color_map is not None and color_map.by == "axis"
+            arguments["color"] = None if by_axis else first.color
+        else:
+            arguments["surfaces"] = self.surfaces
+        return self.volume.render(**arguments | more)
+
+    def save(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        volume: str | os.PathLike[str] | None = None,
+        field: str | os.PathLike[str] | None = None,
+    ) -> None:
+        """Writes a scene file, JSON, for open_scene(), `isowave render --scene` and C++.
+
+        Parameters
+        ----------
+        path
+            The file's name, which ends in .json.
+        volume
+            The name of the volume's file, which is then opened with the scene.
+        field
+            The name of the field's file, likewise. "volume": the drawn volume; None: that if the
+            field is the drawn volume.
+
+        Raises
+        ------
+        Error
+            A scene that cannot be drawn; a file that cannot be written.
+        """
+        fields = scene_fields(self)
+        fields["volume"] = None if volume is None else os.fsdecode(volume)
+        if field is not None:
+            fields["field"] = os.fsdecode(field)
+        _core.write_scene(fields, os.fsdecode(path))
+
+
+def scene_fields(scene: Scene) -> dict[str, Any]:
+    """The scene as fields of isowave::Scene, without files. Raises TypeError, ValueError."""
+    color_map = color_map_of(scene.color_map)
+    field: Any = scene.field
+    shows_volume = field is scene.volume or (
+        field is None and color_map is not None and color_map.by == "caps"
+    )
+    return {
+        "field": "volume" if shows_volume else None,
+        "camera": None if scene.view is None else camera_for_core(camera_of(scene.view)),
+        "surfaces": [vars(surface) for surface in surfaces_of(scene.surfaces)],
+        "slices": [vars(each) for each in slices_of(scene.slices)],
+        "clip": [vars(plane) for plane in clip_of(scene.planes)],
+        "caps": scene.caps,
+        "background": optional_color(scene.background),
+        "background_top": optional_color(scene.background_top),
+        "transparent": scene.transparent,
+        **color_map_for_core(color_map),
+        **slice_map_for_core(slice_map_of(scene.slice_map)),
+        **lights_of(scene.lights),
+        "light_direction": None if scene.light is None else vector(scene.light),
+        "shadow_rays": scene.shadow_rays,
+        "light_angle": scene.light_angle,
+    }

@@ -1,0 +1,126 @@
+"""Scene files."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+from isowave import _core
+from isowave._camera import Camera, vector
+from isowave._clip import ClipPlane
+from isowave._color_map import ColorMap
+from isowave._compress import open as open_volume
+from isowave._levels import Voxels
+from isowave._request import LIGHTS
+from isowave._scene import Scene, SceneVolume
+from isowave._slice import Slice
+from isowave._surface import Surface
+from isowave._volume import Volume
+
+
+def open_scene(
+    path: str | os.PathLike[str],
+    *,
+    volume: SceneVolume | None = None,
+    field: Voxels | None = None,
+    **options: Any,
+) -> Scene:
+    """Reads a scene file, as Scene.save(), `isowave render --save-scene` and the viewer write it.
+
+    Parameters
+    ----------
+    path
+        The file's name.
+    volume
+        The volume to draw. None: the one that the file names, opened with open()'s `options`.
+    field
+        The second volume, if colours are by one. None: the one that the file names, opened with
+        the `options` of compression.
+
+    Raises
+    ------
+    Error
+        The file is no scene: what is wrong, and where, in one line. It names no volume or no field,
+        and none is given. A volume cannot be opened.
+    """
+    fields = _core.read_scene(os.fsdecode(path))
+    wants_field = field is None and fields["color_by_field"]
+    if wants_field and not fields["field"]:
+        raise _core.Error(f"{os.fsdecode(path)}: it names no field: give field=")
+    if wants_field and fields["field"] != "volume":
+        field = open_field(fields["field"], options)
+    if volume is None:
+        if not fields["volume"]:
+            raise _core.Error(f"{os.fsdecode(path)}: it names no volume: give volume=")
+        volume = open_volume(fields["volume"], **options)
+    elif options:
+        raise TypeError(f"{', '.join(options)}: the volume is open already")
+    drawn: Any = volume
+    return Scene(
+        volume,
+        tuple(
+            Surface(each["isovalue"], vector(each["color"]), each["opacity"], each["clipped"])
+            for each in fields["surfaces"]
+        ),
+        tuple(
+            Slice(vector(each["normal"]), each["offset"], each["opacity"], each["clipped"])
+            for each in fields["slices"]
+        ),
+        tuple(ClipPlane(vector(plane["normal"]), plane["offset"]) for plane in fields["clip"]),
+        fields["caps"],
+        slice_map_of_scene(fields),
+        color_map_of_scene(fields),
+        None if fields["transparent"] else vector(fields["background"]),
+        None if fields["transparent"] else optional_vector(fields["background_top"]),
+        fields["transparent"],
+        {name: fields[name] for name in LIGHTS},
+        optional_vector(fields["light_direction"]),
+        fields["shadow_rays"],
+        fields["light_angle"],
+        drawn if wants_field and field is None else field,
+        camera_of_scene(fields["camera"]),
+    )
+
+
+def open_field(name: str, options: dict[str, Any]) -> Volume:
+    """Opens a second volume beside one that is opened with these options."""
+    if name.endswith(".zfp"):  # compressed already
+        return open_volume(name)
+    own = ("shape", "dtype", "spacing")  # of the volume's file alone
+    return open_volume(name, **{key: each for key, each in options.items() if key not in own})
+
+
+def optional_vector(value: Any) -> Any:
+    return None if value is None else vector(value)
+
+
+def color_map_of_scene(fields: dict[str, Any]) -> ColorMap | None:
+    colors = fields["color_table"] or fields["color_map"]
+    if not colors:
+        return None
+    low, high = fields["color_low"], fields["color_high"]
+    return ColorMap(
+        colors,
+        vector(fields["color_axis"]),
+        None if low is None else (low, high),
+        ("caps" if fields["color_caps_alone"] else "field") if fields["color_by_field"] else "axis",
+    )
+
+
+def slice_map_of_scene(fields: dict[str, Any]) -> ColorMap:
+    low, high = fields["slice_low"], fields["slice_high"]
+    return ColorMap(
+        fields["slice_table"] or fields["slice_map"], range=None if low is None else (low, high)
+    )
+
+
+def camera_of_scene(fields: dict[str, Any] | None) -> Camera | None:
+    if fields is None:
+        return None
+    return Camera(
+        vector(fields["eye"]),
+        vector(fields["at"]),
+        vector(fields["up"]),
+        fields["fovy_degrees"],
+        fields["parallel_height"],
+    )

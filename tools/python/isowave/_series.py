@@ -1,0 +1,174 @@
+"""Series of volumes, such as the time steps of a simulation."""
+
+from __future__ import annotations
+
+import os
+import threading
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, overload
+
+import numpy as np
+import numpy.typing as npt
+
+from isowave import _core
+from isowave._camera import Camera
+from isowave._checked import Isovalue, refuse, reversed_axes
+from isowave._compress import compress, compression_options, dims_of
+from isowave._image import Image
+from isowave._request import isovalue_or_surfaces
+from isowave._surface import Surface
+from isowave._volume import Volume
+
+
+class Series(Sequence[Volume]):
+    """Volumes on one grid, in an order; open_series() makes it.
+
+    series[3] opens a step, and series[::10] is the series of every tenth one. A loop over the
+    series gets the volumes one by one, while a thread reads and compresses the next one: memory
+    holds two of them.
+    """
+
+    def __init__(self, names: Sequence[str], load: Callable[[int], Volume]) -> None:
+        """load: opens a step; called by any thread."""
+        self.names = tuple(names)  #: What messages call the steps: "step_3.nrrd", "run.nii, step 3"
+        self._load = load
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    @overload
+    def __getitem__(self, index: int) -> Volume:
+        ...
+
+    @overload
+    def __getitem__(self, index: slice) -> Series:
+        ...
+
+    def __getitem__(self, index: int | slice) -> Volume | Series:
+        steps = range(len(self))
+        if isinstance(index, slice):
+            chosen = steps[index]
+            return Series([self.names[i] for i in chosen], lambda i: self._load(chosen[i]))
+        return self._load(steps[index])
+
+    def __iter__(self) -> Iterator[Volume]:
+        with ThreadPoolExecutor(1, "isowave-series") as thread:
+            ahead = None
+            for step in range(len(self)):
+                volume = self._load(step) if ahead is None else ahead.result()
+                if step + 1 < len(self):
+                    ahead = thread.submit(self._load, step + 1)
+                yield volume
+                del volume  # before the next but one takes its memory
+
+    def __repr__(self) -> str:
+        return f"<isowave.Series of {len(self)} steps>"
+
+    def render(
+        self,
+        isovalue: Isovalue | None = None,
+        *,
+        size: tuple[int, int] = (1280, 720),
+        camera: Camera | None = None,
+        surfaces: Sequence[Surface] = (),
+        device: str | int | None = None,
+        **more: Any,
+    ) -> Iterator[Image]:
+        """Draws each step, as Volume.render() does: a picture at a time, when it is asked for.
+
+        Without a camera, all pictures have the one that Volume.camera() has for the first step.
+        isovalue="auto" is the first step's suggestion.
+        """
+        isovalue_or_surfaces(isovalue, surfaces)
+        for volume in self:
+            if isovalue is not None:
+                isovalue = volume._isovalue(isovalue)
+            if camera is None:
+                camera = volume.camera(isovalue, size=size, surfaces=surfaces, device=device)
+            yield volume.render(
+                isovalue, size=size, camera=camera, surfaces=surfaces, device=device, **more
+            )
+
+
+def open_series(
+    source: Any,
+    *,
+    tolerance: float | None = None,
+    relative_tolerance: float | None = None,
+    rate: int | None = None,
+    exact: bool = False,
+    shape: Sequence[int] | None = None,
+    dtype: npt.DTypeLike | None = None,
+    spacing: Sequence[float] | None = None,
+    levels: int = 1,
+    map_nan: float | None = None,
+    no_data: float | None = None,
+    num_threads: int = 0,
+    **placed: Any,
+) -> Series:
+    """Opens a series of volumes on one grid.
+
+    Parameters
+    ----------
+    source
+        A pattern of files, as in a shell (*, ?, [a-z]), taken in natural order: step_2 before
+        step_10. Or a NIfTI or NRRD file with a fourth axis, a list of paths, or an array with the
+        axes (t, z, y, x), whose parts array[t] compress() takes.
+    tolerance, relative_tolerance, rate, exact, levels, map_nan, no_data, num_threads
+        As compress() has them, for each step.
+    shape, dtype, spacing
+        As open() has them, for files.
+    origin, direction, fill_value, spacing
+        As compress() has them, for arrays.
+
+    Raises
+    ------
+    Error
+        No file; one that cannot be opened; one with another grid than the first.
+    """
+    options = (tolerance, relative_tolerance, rate, exact, levels, map_nan, no_data, num_threads)
+    checked = compression_options(*options)
+    if is_path(source) or (isinstance(source, (list, tuple)) and all(map(is_path, source))):
+        if placed:
+            raise TypeError(f"{next(iter(placed))}: files say it themselves")
+        paths = [os.fsdecode(path) for path in ([source] if is_path(source) else source)]
+        if paths and all(path.endswith(".zfp") for path in paths):
+            checked["measure_error"] = False
+        return of_files(
+            _core.open_series(
+                paths,
+                checked,
+                None if shape is None else dims_of(shape),
+                None if dtype is None else np.dtype(dtype).name,
+                None if spacing is None else reversed_axes(spacing),
+            )
+        )
+    if shape is not None or dtype is not None:
+        raise TypeError("shape and dtype are for files: the array has its own")
+    if len(getattr(source, "shape", ())) != 4:
+        raise refuse("source", source, "a pattern, a list of paths or an array (t, z, y, x)")
+    names = (*("tolerance", "relative_tolerance", "rate", "exact"), "levels", "map_nan", "no_data")
+    how = {**dict(zip((*names, "num_threads"), options)), "spacing": spacing, **placed}
+    count = int(source.shape[0])
+    return Series(
+        [f"step {i}" for i in range(count)],
+        lambda i: compress(source[i], progress=False, **how),
+    )
+
+
+def is_path(source: Any) -> bool:
+    return isinstance(source, (str, bytes, os.PathLike))
+
+
+def of_files(core: _core.Series) -> Series:
+    lock = threading.Lock()
+    for notice in core.notices:
+        warnings.warn(notice, RuntimeWarning, stacklevel=3)
+
+    def load(step: int) -> Volume:
+        with lock:
+            return Volume(core.open(step))
+
+    return Series([core.name(i) for i in range(core.size)], load)

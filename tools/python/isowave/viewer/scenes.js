@@ -1,0 +1,145 @@
+// scenes.js -- scene files in the page. A part of an ES module (front_end.py).
+
+const MAX_MESSAGE_BYTES = 8192; // as the server has it
+
+const toHex = (rgb) => `#${rgb.map((part) =>
+  Math.round(255 * clamp(part, 0, 1)).toString(16).padStart(2, "0")).join("")}`;
+
+/**
+ * The scene file of what a view shows.
+ * @param {State} state
+ * @param {string} background "#rrggbb", as it is shown
+ * @param {{box: [Vec, Vec], field: ?{name: string}}} volume as in welcome
+ * @returns {string} JSON, as isowave/scene.hpp describes it
+ */
+export function writeScene(state, background, { box, field }) {
+  const { camera, caps } = state;
+  const { color_map: map, lights, light, shadow } = lookOf(state);
+  return JSON.stringify({
+    isowave_scene: 1,
+    ...(camera && { camera: { eye: camera.eye, at: camera.at, up: camera.up,
+      fovy_degrees: camera.fovy_deg } }),
+    surfaces: state.surfaces.filter((s) => s.shown).map(({ isovalue, color, opacity }) =>
+      ({ isovalue, color, opacity })),
+    clip: [...clipPlanes(state.clip, box), ...state.planes],
+    caps,
+    background,
+    ...(map && { color_map: map.colors, color_axis: map.axis }),
+    ...(map && map.by !== "axis" && { color_by_field: true, color_caps_alone: map.by === "caps",
+      ...(field?.name && { field: field.name }) }),
+    ...(map?.range && { color_low: map.range[0], color_high: map.range[1] }),
+    ...lights,
+    ...(light && { light_direction: light }),
+    ...(shadow && { shadow_rays: shadow.rays, light_angle: shadow.angle }),
+  }, null, 1);
+}
+
+/**
+ * A scene as a view shows it.
+ * @param {Record<string, any>} fields as `isowave._core.parse_scene()` gives them; those that are
+ *    null or not there have their defaults
+ * @param {boolean} hasField whether the server has a second volume, which comes in place of theirs
+ * @returns {Partial<State>}
+ * @throws {Error} that says what this page cannot show
+ */
+export function readScene(fields, hasField) {
+  const { camera, color_map: colors, color_axis: axis = AXES.z, color_low: low } = fields;
+  if (fields.color_by_field && !hasField) {
+    throw new Error("This page has no second volume to colour by: isowave view --field FILE.");
+  }
+  if (fields.slices?.length) throw new Error("This page shows no slices.");
+  if (fields.surfaces.some(({ clipped }) => clipped === false)) {
+    throw new Error('This page cuts all surfaces: leave out "clipped".');
+  }
+  if (fields.background_top) throw new Error("This page shows no gradient as background.");
+  if (fields.color_table?.length) throw new Error("This page shows no tables of colours.");
+  if (typeof low === "number" && !(Math.max(Math.abs(low), Math.abs(fields.color_high)) <= 1e18)) {
+    throw new Error("This page shows colours of values up to 1e18.");
+  }
+  if (fields.clip.some(({ normal, offset }) => !(Math.abs(offset) / length(normal) <= 1e18))) {
+    throw new Error("This page shows clipping planes up to 1e18 from the origin.");
+  }
+  if (fields.clip.length > MAX_PLANES) {
+    throw new Error(`This page shows up to ${MAX_PLANES} clipping planes of a scene.`);
+  }
+  const view = camera && { up: [0, 1, 0], fovy_deg: 60, ...camera };
+  if (view?.fovy_degrees) view.fovy_deg = view.fovy_degrees;
+  if (typeof view?.parallel_height === "number") {
+    throw new Error('This page draws in perspective alone: leave out "parallel_height".');
+  }
+  return {
+    camera: view ? checkCamera(view) : null,
+    surfaces: fields.surfaces.map(({ isovalue, color, opacity }) => makeSurface(
+      isovalue, toHex(color), Math.max(opacity, LEAST_OPACITY))),
+    selected: 0,
+    clip: WHOLE,
+    planes: fields.clip.map(({ normal, offset }) => (
+      { normal: unit(normal), offset: offset / length(normal) })),
+    caps: fields.caps ?? true,
+    background: fields.background ? toHex(fields.background) : null,
+    color_map: colors ? { colors, axis: unit(axis),
+      by: !fields.color_by_field ? "axis" : fields.color_caps_alone ? "caps" : "field",
+      range: typeof low === "number" ? [low, fields.color_high] : null } : null,
+    light: fields.light_direction ? unit(fields.light_direction) : null,
+    shadow: fields.light_direction && fields.shadow_rays > 0
+      ? { rays: Math.min(fields.shadow_rays, 255),
+        angle: clamp(fields.light_angle ?? LIGHT_ANGLE, 0.01, 45) } : null,
+    lights: LIGHTS.every((name) => typeof fields[name] === "number")
+      ? Object.fromEntries(LIGHTS.map((name) => [name, clamp(fields[name], 0, 10)])) : null,
+  };
+}
+
+/** Has the browser save a file. */
+function saveAs(blob, name) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(blob);
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+}
+
+/** The buttons for scene files. */
+class SceneFiles {
+  /** @param {View} view whose state they save and change */
+  constructor(view) {
+    this.view = view;
+    this.take = ({ fields }) => this.use(fields);
+  }
+
+  listen(on) {
+    const { view } = this;
+    on(view.field("save_scene"), "click", () => this.save());
+    on(view.field("open_scene"), "click", () => view.field("scene_file").click());
+    on(view.field("scene_file"), "change", (e) => this.open(e.target));
+  }
+
+  save() {
+    const { state, volume } = this.view;
+    if (!volume) return;
+    const text = writeScene(state, this.view.backgroundShown(), volume);
+    saveAs(new Blob([text], { type: "application/json" }), "scene.json");
+  }
+
+  /** The server reads the file: there is one reader of scenes. */
+  async open(input) {
+    const [file] = input.files;
+    if (!file) return;
+    const message = { type: "scene", text: await file.slice(0, MAX_MESSAGE_BYTES).text() };
+    input.value = ""; // the same file can be opened again
+    const { length: bytes } = new TextEncoder().encode(JSON.stringify(message));
+    if (bytes > MAX_MESSAGE_BYTES) {
+      this.view.note(`${file.name} is too large for a scene of this page.`, "error");
+    } else {
+      this.view.home.send(message);
+    }
+  }
+
+  /** Shows the scene of these fields. */
+  use(fields) {
+    try {
+      this.view.change(readScene(fields, Boolean(this.view.volume?.field)));
+    } catch (error) {
+      this.view.note(error.message, "error");
+    }
+  }
+}
