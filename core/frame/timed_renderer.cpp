@@ -37,11 +37,9 @@ double TimedRenderer::steady_clock_ms() {
       .count();
 }
 
-void TimedRenderer::set_up() {
-  const Abilities can = inner().abilities();
-  if (!can.kept_picture)
+void TimedRenderer::check_keeps_picture() {
+  if (!inner().abilities().kept_picture)
     throw Error("no frame can be drawn within a time: the renderer was made to keep no picture");
-  levels_pay_ = of_first(team(), std::vector{can.levels_pay ? 1.0 : 0.0}).front() != 0;
 }
 
 Abilities TimedRenderer::abilities() const {
@@ -59,6 +57,7 @@ FrameStats TimedRenderer::render(const FrameRequest &request) {
   if (!request.time_budget_ms) return inner().render(request);
   core::check(request, abilities());
   check_can_keep(request);
+  levels_pay_ = of_first(team(), std::vector{abilities().levels_pay ? 1.0 : 0.0}).front() != 0;
   const double fetch_ms = fetch_ms_;
   const double begin = now_ms(), end = begin + *request.time_budget_ms - fetch_ms;
   FrameStats sum;

@@ -21,16 +21,16 @@ class TimedRenderer : public RendererAround {
  public:
   using Clock = std::function<double()>;  ///< [ms]
 
-  /// now: for tests. A team takes rank 0's time.
+  /// now: for tests. A team takes rank 0's time. A rank may make its renderer while others do not.
   ///
   /// Throws  Error: the renderer was made to keep no picture
   explicit TimedRenderer(Renderer &inner, Clock now = steady_clock_ms)
       : RendererAround(inner), now_(std::move(now)) {
-    set_up();
+    check_keeps_picture();
   }
   explicit TimedRenderer(std::unique_ptr<Renderer> inner, Clock now = steady_clock_ms)
       : RendererAround(std::move(inner)), now_(std::move(now)) {
-    set_up();
+    check_keeps_picture();
   }
 
   Abilities abilities() const override;
@@ -62,7 +62,7 @@ class TimedRenderer : public RendererAround {
     bool is_stopped = false;
   };
 
-  void set_up();
+  void check_keeps_picture();
   void check_can_keep(const FrameRequest &request) const;
   double now_ms();
   FrameRequest request_of(const FrameRequest &request, std::size_t step) const;
@@ -73,7 +73,7 @@ class TimedRenderer : public RendererAround {
                         double left_ms) const;
 
   Clock now_;
-  bool levels_pay_ = false;  ///< rank 0's: all ranks must decide alike
+  bool levels_pay_ = false;  ///< at rank 0, for this frame: all ranks must decide alike
   /// Time of each step when it was drawn last [ms]; 0: unknown.
   std::array<double, kNumSteps> last_ms_{};
   std::optional<float> isovalue_{};  ///< of the last frame
