@@ -8,6 +8,7 @@
 
 #include <cmath>
 #include <functional>
+#include <optional>
 #include <thread>
 
 #include "core/accuracy/bounded_renderer.hpp"
@@ -63,6 +64,7 @@ class BrickTeamOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
   /// Each rank of a team does this with its brick.
   void on_ranks(std::uint32_t size, const RendererOptions &options, const Work &work) {
     const Cuts cuts(blocks_along(volume_.info()), size);
+    const std::vector<VolumeInfo> whole{volume_.info()};
     test::ThreadMeeting meeting(size);
     std::vector<std::jthread> threads;
     for (std::uint32_t rank = 0; rank < size; ++rank) {
@@ -70,8 +72,10 @@ class BrickTeamOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
         ThreadTeam team(meeting, rank);
         ocl::Device device(GetParam());
         const CompressedVolume brick = cut_brick(volume_.compressed, cuts.bricks()[rank]);
-        TeamRenderer renderer(device, brick, options, cuts, {volume_.info()}, team);
-        work(renderer, rank);
+        std::optional<TeamRenderer> renderer;
+        in_turns(team, rank == 0,
+                 [&] { renderer.emplace(device, brick, options, cuts, whole, team); });
+        work(*renderer, rank);
       });
     }
   }
@@ -479,7 +483,9 @@ void expect_by_team(std::uint32_t size, const CompressedVolume &volume,
     CompressedVolume brick = cut_brick(volume, cuts.bricks()[rank], num_levels);
     const double rate = agree_on_voxels(team, brick);
     EXPECT_EQ(rate, volume.rate());
-    TeamRenderer renderer(device, brick, options, cuts, levels, team);
+    std::optional<TeamRenderer> made;
+    in_turns(team, rank == 0, [&] { made.emplace(device, brick, options, cuts, levels, team); });
+    TeamRenderer &renderer = *made;
     for (std::size_t i = 0; i < cases.size(); ++i) {
       const BoundedFrame frame = draw_within(renderer, brick, rate, cases[i]);
       EXPECT_EQ(text_of(frame.choice), text_of(expected[i].choice));

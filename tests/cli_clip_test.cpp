@@ -23,7 +23,8 @@ constexpr double kRadius = 8, kMiddle = 16, kEye = 116;
 const std::string kSphere = "generate:sphere_33x33x33_float32 --exact -i " +
                             fmt::format("{}", 1 - kRadius / kMiddle / std::sqrt(3.0));
 
-/// Depths in parallel projection along -z, from z = kEye. A pixel is half a voxel wide.
+/// Depths in parallel projection along -z, from z = kEye. A pixel is half a voxel wide. The host
+/// draws: it has no kernels to compile.
 class CliClip : public testing::Test {
  protected:
   CliClip() {
@@ -31,9 +32,9 @@ class CliClip : public testing::Test {
         {"eye":[16,16,116],"at":[16,16,16],"up":[0,1,0],"parallel_height":24}]})");
   }
   FloatImage draw(const std::string &options) const {
-    const auto result =
-        test::run_isowave("render " + kSphere + " --cameras " + quoted(folder_ / "c.json") +
-                          " --depth " + quoted(folder_ / "d.npy") + " " + options);
+    const auto result = test::run_isowave("render --device host " + kSphere + " --cameras " +
+                                          quoted(folder_ / "c.json") + " --depth " +
+                                          quoted(folder_ / "d.npy") + " " + options);
     EXPECT_EQ(result.status, 0) << options << "\n" << result.err;
     return read_npy(folder_ / "d.npy");
   }

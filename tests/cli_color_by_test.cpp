@@ -24,10 +24,11 @@ const std::string kHead = kVolume + " -i 80 --size 48x36 ";
 
 class CliColorBy : public testing::Test {
  protected:
-  /// The bytes of a picture.
-  std::string draw(const std::string &options) const {
+  /// The bytes of a picture. The host draws it by default: it has no kernels to compile.
+  std::string draw(const std::string &options, const std::string &by = "--device host") const {
     const auto path = folder_ / "a.png";
-    const auto result = test::run_isowave("render " + kHead + options + " -o " + quoted(path));
+    const auto result =
+        test::run_isowave("render " + kHead + options + " " + by + " -o " + quoted(path));
     EXPECT_EQ(result.status, 0) << options << "\n" << result.err;
     return test::read_file(path);
   }
@@ -48,9 +49,9 @@ TEST_F(CliColorBy, AxesAndMapsMakeDifferentPictures) {
 TEST_F(CliColorBy, AllRenderersDrawTheSameBytes) {
   for (const std::string &more : {std::string(), std::string(" --samples 2 --clip 1,0,0.2"),
                                   std::string(" --transparent --parallel")}) {
-    const std::string host = draw("--device host --color-by 1,0,2" + more);
-    EXPECT_EQ(draw("--device cpu --color-by 1,0,2" + more), host) << more;
-    EXPECT_EQ(draw("--reference --color-by 1,0,2" + more), host) << more;
+    const std::string options = "--color-by 1,0,2" + more, host = draw(options);
+    EXPECT_EQ(draw(options, "--device cpu"), host) << more;
+    EXPECT_EQ(draw(options, "--reference"), host) << more;
   }
 }
 
@@ -63,15 +64,15 @@ TEST_F(CliColorBy, AFieldColoursTheSurface) {
                                          "--color-by volume --clip=-1,0,0,-20",
                                          "--color-by volume,0,90 --clip=-1,0,0,-20"};
   for (const std::string &option : options) {
-    const std::string more = " " + option;
-    const std::string host = draw("--device host" + more);
-    EXPECT_EQ(draw("--device cpu" + more), host) << more;
-    EXPECT_EQ(draw("--reference" + more), host) << more;
+    const std::string host = draw(option);
+    EXPECT_EQ(draw(option, "--device cpu"), host) << option;
+    EXPECT_EQ(draw(option, "--reference"), host) << option;
     pictures.insert(host);
   }
   EXPECT_EQ(pictures.size(), 6u);
-  const auto result = test::run_isowave(
-      "render " + kHead + "--color-by volume --clip=-1,0,0,-20 -o " + quoted(folder_ / "a.png"));
+  const auto result = test::run_isowave("render " + kHead +
+                                        "--color-by volume --clip=-1,0,0,-20 --device host -o " +
+                                        quoted(folder_ / "a.png"));
   EXPECT_THAT(result.out, testing::HasSubstr("values of the field at the hits: "));
   EXPECT_EQ(draw("--color-by volume"), draw("")) << "there are no caps";
   EXPECT_EQ(draw("--color-by volume --color red"), draw("--color red"));
@@ -84,7 +85,7 @@ TEST_F(CliColorBy, AnAxisStaysOneIfAFileHasItsName) {
   std::ofstream("z") << "no volume";
   EXPECT_EQ(draw("--color-by z"), axis);
   EXPECT_EQ(draw("--color-by z,0,40"), axis);
-  const auto of_file = test::run_isowave("render " + kHead + "--color-by ./z");
+  const auto of_file = test::run_isowave("render " + kHead + "--device host --color-by ./z");
   EXPECT_EQ(of_file.status, 1);
   EXPECT_THAT(of_file.err, testing::HasSubstr("./z: unknown kind of volume"));
   std::filesystem::current_path(before);

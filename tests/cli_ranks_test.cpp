@@ -160,6 +160,10 @@ class CliRanks : public testing::Test {
   std::size_t num_inputs_ = 0;  ///< files that write_raw() has made
 };
 
+void skip_unless_long() {
+  if (std::getenv("ISOWAVE_LONG_TESTS") == nullptr) GTEST_SKIP() << "among the long tests";
+}
+
 TEST_F(CliRanks, DrawWhatOneProcessDraws) {
   expect_same(convert(""), "-i 40 --size 96x64", 2);  // the view that the surface fills
   expect_same(kFuel, "-i 40 --size 64x48 --transparent", 2, " --bricks active");
@@ -194,7 +198,10 @@ TEST_F(CliRanks, Turntables) {
   expect_same(convert("--exact"), "-i 90 --size 48x32 --turntable 3", 2);
 }
 
-TEST_F(CliRanks, AmbientRays) {
+/// WithinAnError has both, too.
+TEST_F(CliRanks, AmbientRaysOfLevels) {
+  skip_unless_long();
+  if (IsSkipped()) return;
   expect_same(convert("--exact --levels 3"),
               "-i 40 --size 48x32 --voxel-pixels 1.5 --ambient 3 --samples 2", 3);
 }
@@ -210,8 +217,8 @@ TEST_F(CliRanks, WithinAnError) {
                      " --bricks active --progress-dir " + quoted(folder_ / "p"));
   EXPECT_TRUE(std::filesystem::exists(folder_ / "p" / "pass0001.png"));
   const std::string unreachable =
-      "generate:mixing_layer_30x40x24_float32 --rate 6 --levels 1 -i 0.5 --size 48x32 "
-      "--pipeline blocks --max-surface-error 0.001 -o " +
+      "generate:mixing_layer_30x40x24_uint8 --rate 6 --levels 1 -i 128 --size 48x32 "
+      "--max-surface-error 0.001 -o " +
       quoted(folder_ / "x.png");
   const ProgramResult one = run_isowave("render " + unreachable),
                       two = run_command(on_ranks(2, "render " + unreachable));
@@ -270,10 +277,6 @@ TEST_F(CliRanks, PicturesWithinATime) {
     EXPECT_EQ(one == read_file(folder_ / "x.png"), !is_short);
     EXPECT_TRUE(one == read_file(folder_ / "r.png"));
   }
-}
-
-void skip_unless_long() {
-  if (std::getenv("ISOWAVE_LONG_TESTS") == nullptr) GTEST_SKIP() << "among the long tests";
 }
 
 TEST_F(CliRanks, ManyRanks) {

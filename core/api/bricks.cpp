@@ -121,7 +121,9 @@ Renderer make_team_renderer(Processes &processes, const std::filesystem::path &p
     open(*held, path.string(), compression, raw, options);
     const core::TeamVolume &volume = held->volume.value();
     std::unique_ptr<core::Renderer> renderer;
-    core::together(held->team, [&] {
+    // Processes do not say which of them share a host: on CPUs all wait for the first.
+    const bool is_on_cpu = held->device->info.type == core::ocl::DeviceType::kCpu;
+    core::in_turns(held->team, !is_on_cpu || held->team.rank() == 0, [&] {
       renderer = std::make_unique<core::TeamRenderer>(
           held->device->device, volume,
           core_options(options.renderer, static_cast<std::uint32_t>(volume.num_levels)),

@@ -79,6 +79,14 @@ void together(Team &team, const std::function<void()> &work) {
   agree_on_error(team, error);
 }
 
+void in_turns(Team &team, bool is_first, const std::function<void()> &work) {
+  for (const bool turn_of_first : {true, false}) {
+    together(team, [&] {
+      if (is_first == turn_of_first) work();
+    });
+  }
+}
+
 void agree_on(Team &team, const std::string &what, const std::string &text) {
   const std::vector<std::string> texts = team.all_gather(text);
   const auto other =

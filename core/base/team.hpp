@@ -86,6 +86,10 @@ void agree_on_error(Team &team, const std::string &error);
 /// it.
 void together(Team &team, const std::function<void()> &work);
 
+/// The same, but ranks that are not first begin when those that are have ended. A driver keeps
+/// kernels that one process has compiled, so the others need not compile them again.
+void in_turns(Team &team, bool is_first, const std::function<void()> &work);
+
 /// Throws Error at every rank unless all have the same text; the error names a rank that differs.
 ///
 /// what  names the text

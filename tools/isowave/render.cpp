@@ -314,12 +314,8 @@ void suggest_isovalue(RenderArgs &options, const Drawing &drawing, Outputs &outp
 /// kernels for all of them: the driver keeps them.
 void make_renderers(RenderArgs &options, Drawing &drawing) {
   const bool is_on_cpu = drawing.is_team() && drawing.device->info().type == ocl::DeviceType::kCpu;
-  const bool is_first = !is_on_cpu || MpiJob::local_rank() == 0;
-  for (const bool turn_of_first : {true, false}) {
-    together(drawing.team, [&] {
-      if (is_first == turn_of_first) make_renderer(options, drawing);
-    });
-  }
+  in_turns(drawing.team, !is_on_cpu || MpiJob::local_rank() == 0,
+           [&] { make_renderer(options, drawing); });
 }
 
 /// Opens the device, if one draws, loads the volume and makes the renderer.
