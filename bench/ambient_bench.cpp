@@ -1,5 +1,5 @@
 // Between two rounds of ambient rays: counts those of the last, and makes the next (ambient.cl).
-// All hits of a frame.
+// All hits of a frame. And what takes rays out that have met a surface.
 
 #include "bench/rays_rig.hpp"
 #include "core/stages/ambient.hpp"
@@ -34,10 +34,22 @@ void ambient(benchmark::State &state) {
   state.counters["hits"] = hits;
 }
 
+/// All rays of a round have met something.
+void block_rays(benchmark::State &state) {
+  auto &in = input<AmbientInput>(state.range(0));
+  const auto hits = static_cast<double>(in.num_hits);
+  measure(
+      state, {hits, hits * (2 * sizeof(GivenRay) + sizeof(float))}, [&] { in.ambient(in.rays, 1); },
+      [&] { in.ambient.block(in.rays); });
+  state.counters["hits"] = hits;
+}
+
 const bool kRegistered = [] {
-  stage_benchmark("ambient", ambient)
-      ->ArgName("width")
-      ->ArgsProduct({{kWidths.begin(), kWidths.end()}});
+  for (const auto &[name, function] :
+       {std::pair{"ambient", ambient}, {"ambient/block", block_rays}})
+    stage_benchmark(name, function)
+        ->ArgName("width")
+        ->ArgsProduct({{kWidths.begin(), kWidths.end()}});
   return true;
 }();
 

@@ -71,6 +71,13 @@ void choose_layer(benchmark::State &state) {
       state, {in.num_rays(), in.num_rays() * bytes}, [] {}, [&] { in.choose(); });
 }
 
+void forget_layer(benchmark::State &state) {
+  auto &in = input<LayersInput>(state.range(0));
+  measure(
+      state, {in.num_rays(), in.num_rays() * sizeof(HitRecord)}, [] {},
+      [&] { in.layers.forget_hits(in.rays); });
+}
+
 void blend_layer(benchmark::State &state) {
   auto &in = input<LayersInput>(state.range(0));
   measure(
@@ -97,7 +104,8 @@ using Case = std::pair<const char *, void (*)(benchmark::State &)>;
 const bool kRegistered = [] {
   for (const auto &[name, function] :
        {Case{"layers/choose", choose_layer}, Case{"layers/blend", blend_layer},
-        Case{"layers/begin", list_rays}, Case{"layers/shade", shade_layers}})
+        Case{"layers/begin", list_rays}, Case{"layers/shade", shade_layers},
+        Case{"layers/forget", forget_layer}})
     stage_benchmark(name, function)
         ->ArgName("width")
         ->ArgsProduct({{kWidths.begin(), kWidths.end()}});

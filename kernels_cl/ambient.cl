@@ -2,10 +2,15 @@
 /// nothing, and makes those of the next (portable/ambient.h).
 ///
 ///   [ smooth normals ] -> ambient -> [ pipeline `rays` on these rays -> ambient ]*
+///
+/// If a frame has several surfaces, the hits of each layer have such rays. A ray may meet each of
+/// the opaque surfaces: it goes through pipeline `rays` once for each, and ambient_block takes out
+/// what has met one.
 #define ISO_FOUND local
 #include "device/level_borders.h"
 #include "portable/ambient.h"
 #include "portable/clip.h"
+#include "portable/layers.h"
 
 #ifndef ISO_PLACED_HITS   /* by -D */
 #define ISO_PLACED_HITS 0 /* 1: hits are placed_hit()s, of whatever brick */
@@ -23,6 +28,7 @@ ISO_INLINE int meets_clipped(const FrameParams *frame, global const ClipParams *
 /// first_level the finest level of detail that draws, of all
 /// directions  [num_rounds][ISO_AMBIENT_PATTERNS]
 /// round       0..num_rounds: the rays to make; num_rounds: none
+/// num_surfaces  hits of surfaces of this number or a greater one have no rays: they are on slices
 /// In      hits [pixel]: of the frame; given [pixel], given_hits [pixel]: the rays of the round
 ///         before, and what they met
 /// Out     open_counts [2][pixel]: ambient rays of the rounds before that met nothing that is
@@ -31,7 +37,7 @@ ISO_INLINE int meets_clipped(const FrameParams *frame, global const ClipParams *
 kernel void ambient(const FrameParams frame_params, global const FrameParams *frames,
                     uint num_frames, global const ClipParams *clip, uint first_level,
                     const AmbientParams params, global const AmbientDirection *directions,
-                    uint round, uint num_rounds, global const HitRecord *hits,
+                    uint round, uint num_rounds, uint num_surfaces, global const HitRecord *hits,
                     global const HitRecord *given_hits, global GivenRay *given,
                     global uchar *open_counts) {
   const FrameParams *frame = &frame_params;
@@ -43,7 +49,7 @@ kernel void ambient(const FrameParams frame_params, global const FrameParams *fr
       open_counts[pixel] = 0;
       if (params.num_ambient != num_rounds) open_counts[num_pixels + pixel] = 0;
     }
-    if (hit.t == INFINITY) {
+    if (hit.t == INFINITY || surface_of(hit) >= num_surfaces) {
       given[pixel] = no_ray();
       continue;
     }
@@ -63,5 +69,25 @@ kernel void ambient(const FrameParams frame_params, global const FrameParams *fr
     given[pixel] =
         ambient_ray(frame, &params, placed, pixel, round,
                     directions[round * ISO_AMBIENT_PATTERNS + ambient_pattern(frame, pixel)]);
+  }
+}
+
+/// Takes out the rays of a round that have met a surface. The others have met nothing then.
+///
+/// frame_params, clip, first_level  as ambient; clip is that of the surface
+/// In, Out  given [pixel], given_hits [pixel]
+/// Launch   grid-stride over pixels
+kernel void ambient_block(const FrameParams frame_params, global const ClipParams *clip,
+                          uint first_level, global GivenRay *given, global HitRecord *given_hits) {
+  const FrameParams *frame = &frame_params;
+  const uint num_pixels = frame->view.width * frame->view.height;
+  for (uint pixel = get_global_id(0); pixel < num_pixels; pixel += get_global_size(0)) {
+    if (!is_given(given[pixel]) || given_hits[pixel].t == INFINITY) continue;
+    if (clip->num_planes != 0 &&
+        meets_clipped(frame, clip, first_level, given[pixel], given_hits[pixel])) {
+      given_hits[pixel] = no_hit();
+    } else {
+      given[pixel] = no_ray();
+    }
   }
 }

@@ -51,10 +51,18 @@ kernel void layers_choose(const FrameParams frame_params, uint surface, uint beg
   }
 }
 
+/// Out     layer [height * width]: no hits
+/// Launch  grid-stride over rays
+kernel void layers_forget(const FrameParams frame_params, global HitRecord *layer) {
+  for (uint ray = get_global_id(0); ray < frame_rays(&frame_params); ray += get_global_size(0))
+    layer[ray] = no_hit();
+}
+
 /// Blends a layer behind the layers before, and lists the rays that go on.
 ///
 /// blends   ISO_COUNTS_ALONE: counts the layer's hits. ISO_PREVIEWS: writes colors and counts.
 ///          ISO_BLENDS: all of Out and In, Out
+/// open_counts, num_ambient, num_shadow  of the layer's hits: as shade_pixel()
 /// In       color_map [ISO_MAP_COLORS]; as layers_choose; layers [1]; values [height * width] of
 ///          hits on slices
 /// In, Out  hits [height * width] of the layer; passed [height * width]; if the layer is not the
@@ -64,9 +72,10 @@ kernel void layers_choose(const FrameParams frame_params, uint surface, uint beg
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void layers_blend(
     const FrameParams frame_params, const ShadeParams shade_params, global const uint *color_map,
     uint blends, uint is_first, global const LayerParams *layers, global const LayerCounts *counts,
-    global const uint *rays, global const float *values, global HitRecord *hits,
-    global HitRecord *first_hits, global uchar *passed, global RayColor *colors,
-    global LayerCounts *next_counts, global uint *next_rays) {
+    global const uint *rays, global const float *values, global const uchar *open_counts,
+    uint num_ambient, uint num_shadow, global HitRecord *hits, global HitRecord *first_hits,
+    global uchar *passed, global RayColor *colors, global LayerCounts *next_counts,
+    global uint *next_rays) {
   const FrameParams *frame = &frame_params;
   local uint sums[2 + ISO_MAX_SURFACES], counters[2];
   const PixelBox box = {0, 0, frame->view.width, frame->view.height};
@@ -87,7 +96,9 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void layers_b
       if (is_seen) atomic_inc(&sums[0]);
       if (blends != ISO_COUNTS_ALONE) {
         const RayColor seen =
-            blend_hit(frame, &shade_params, color_map, layers, ray, hit, value, colors[ray]);
+            blend_hit(frame, &shade_params, color_map, layers, ray, hit, value,
+                      open_share(open_counts, ray, num_ambient),
+                      open_share(open_counts, frame_rays(frame) + ray, num_shadow), colors[ray]);
         colors[ray] = seen;
         is_on = goes_on(seen);
         if (is_on) atomic_inc(&sums[2 + surface_of(hit)]);

@@ -1,6 +1,7 @@
 #include "reference/twin.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "core/base/parallel_for.hpp"
@@ -73,11 +74,61 @@ std::vector<HitRecord> crossings(const FrameParams &frame, const std::vector<flo
   return hits;
 }
 
+/// A surface that light rays may meet.
+struct Caster {
+  FrameParams frame;
+  ClipParams clip;
+};
+
+/// The light rays of hits in layers.
+class LayerLight {
+ public:
+  LayerLight(const LightRays &rays, const VolumeInfo &info, const std::vector<float> &voxels)
+      : rays_(rays),
+        params_(make_ambient_params(info, rays.num_ambient)),
+        directions_(make_light_directions(rays)),
+        voxels_(voxels) {}
+
+  void add(const Caster &caster) { casters_.push_back(caster); }
+
+  /// The rays of a hit that meet nothing: ambient rays, and shadow rays.
+  std::array<uchar, 2> count_open(const FrameParams &seen, uint pixel, const HitRecord &hit) const {
+    std::array<uchar, 2> counts{};
+    const HitRecord placed = placed_hit(&seen, 0, hit);
+    for (std::uint32_t k = 0; k < rays_.count(); ++k) {
+      const GivenRay given =
+          ambient_ray(&seen, &params_, placed, pixel, k,
+                      directions_[k * ISO_AMBIENT_PATTERNS + ambient_pattern(&seen, pixel)]);
+      if (!is_given(given) || meets_any(given)) continue;
+      uchar &count = counts[is_shadow_ray(&params_, k) ? 1 : 0];
+      count = static_cast<uchar>(count + 1);
+    }
+    return counts;
+  }
+
+ private:
+  bool meets_any(const GivenRay &given) const {
+    return std::ranges::any_of(casters_, [&](const Caster &caster) {
+      const HitRecord met =
+          trace_scalar(caster.frame, voxels_, kDefaultSolver, make_given_ray(given));
+      return std::isfinite(met.t) &&
+             !is_clipped(&caster.clip, given, 1.0f, met.t / caster.frame.view.t_scale);
+    });
+  }
+
+  LightRays rays_;
+  AmbientParams params_;
+  std::vector<AmbientDirection> directions_;
+  const std::vector<float> &voxels_;
+  std::vector<Caster> casters_;
+};
+
 }  // namespace
 
 LayeredFrame Twin::render_layers(const Camera &camera, ImageSize size,
                                  const std::vector<SurfaceStyle> &surfaces, const Appearance &light,
-                                 Normals normals, const Clip &clip_by, const Slices &slices) const {
+                                 Normals normals, const Clip &clip_by, const Slices &slices,
+                                 const LightRays &light_rays) const {
   check_surfaces(surfaces, slices);
   const std::vector<std::uint32_t> order = innermost_first(surfaces);
   std::vector<FrameParams> frames;  // in that order
@@ -88,6 +139,11 @@ LayeredFrame Twin::render_layers(const Camera &camera, ImageSize size,
   const Shading shading = make_shading(levels_[0], light);
   const LayerParams colors =
       make_layer_params(surfaces, slices, levels_[0], frames[0].view, camera);
+  LayerLight lights(light_rays, levels_[0], voxels_[0]);
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    const SurfaceStyle &surface = surfaces[order[k]];
+    if (surface.opacity == 1) lights.add({frames[k], surface.clipped ? clip : ClipParams{}});
+  }
   FieldMap map = make_field_map({levels_.data(), 1}, levels_[0]);
   map.first_surface = colors.num_surfaces;
   const uint num_slices = colors.slices.num_planes;
@@ -136,8 +192,11 @@ LayeredFrame Twin::render_layers(const Camera &camera, ImageSize size,
       if (is_unseen(&colors, hit, value)) continue;
       result.layers[layer][i] = hit;
       if (!std::isfinite(result.first_hits[i].t)) result.first_hits[i] = hit;
+      std::array<uchar, 2> open{};
+      if (!is_of_slice(&colors, hit)) open = lights.count_open(frames[0], pixel, hit);
       color = blend_hit(frames.data(), &shading.params, shading.color_map.data(), &colors, pixel,
-                        hit, value, color);
+                        hit, value, open_share(open.data(), 0, light_rays.num_ambient),
+                        open_share(open.data(), 1, light_rays.num_shadow), color);
     }
   });
   const auto is_hit = [](const HitRecord &hit) { return std::isfinite(hit.t); };

@@ -46,10 +46,12 @@ class Twin {
 
   /// The layers that a renderer must find and blend, bit for bit, of the finest level of detail.
   /// Finds all crossings of each ray with each surface before it merges them.
+  ///
+  /// light_rays  of the hits of each layer; they end at surfaces of opacity 1
   LayeredFrame render_layers(const Camera &camera, ImageSize size,
                              const std::vector<SurfaceStyle> &surfaces, const Appearance &light,
                              Normals normals = Normals::kSmooth, const Clip &clip = {},
-                             const Slices &slices = {}) const;
+                             const Slices &slices = {}, const LightRays &light_rays = {}) const;
 
  private:
   double voxel_pixels_;

@@ -43,20 +43,21 @@ FrameStats TwinRenderer::render(const FrameRequest &request) {
   open_ = {};
   colors_.clear();
   FrameStats stats;
+  const LightRays rays = light_rays_of(request);
   if (request.surfaces.empty()) {
     hits_ = twin_->render(request.camera, size_, request.isovalue, solver_, request.normals,
                           request.clip);
   } else {
     LayeredFrame layered =
         twin_->render_layers(request.camera, size_, request.surfaces, request.light,
-                             request.normals, request.clip, request.slices);
+                             request.normals, request.clip, request.slices, rays);
     hits_ = std::move(layered.first_hits);
     colors_ = std::move(layered.colors);
     stats.layers = layered.stats;
   }
   field_values_.clear();
   if (request.field_values) field_values_ = field_->values(levels(), hits_, request.field_on_caps);
-  if (const LightRays rays = light_rays_of(request); rays.count() != 0)
+  if (request.surfaces.empty() && rays.count() != 0)
     open_ =
         twin_->open(request.camera, size_, request.isovalue, hits_, rays, solver_, request.clip);
   stats.rays_hit = static_cast<std::uint64_t>(

@@ -171,7 +171,10 @@ TEST(ApiSurfaces, BadRequestsAreOneLine) {
   refuse("a colour of 1.5 is", [](Request &r) { r.surfaces[0].color[2] = 1.5f; });
   refuse("leave out bound", [](Request &r) { r.bound = FieldBound::kLower; });
   refuse("leave out voxel_pixels", [](Request &r) { r.voxel_pixels = 1; });
-  refuse("leave out ambient_rays", [](Request &r) { r.ambient_rays = 1; });
+  refuse("end at surfaces of opacity 1, and there is none", [](Request &r) {
+    r.ambient_rays = 1;
+    for (Surface &surface : r.surfaces) surface.opacity = 0.5f;
+  });
   refuse("leave out max_surface_error", [](Request &r) { r.max_surface_error = 1; });
   refuse("leave out time_budget_ms", [](Request &r) { r.time_budget_ms = 1; });
   refuse("errors are bounded of one opaque surface: leave out surfaces",

@@ -500,7 +500,12 @@ TEST(LayersOnTheHost, RefusesInOneLine) {
       [](FrameRequest &request) { request.surfaces[2].isovalue = request.surfaces[0].isovalue; },
       "two surfaces have the isovalue 0.1");
   expect_refusal([](FrameRequest &request) { request.voxel_pixels = 1; }, "leave out voxel_pixels");
-  expect_refusal([](FrameRequest &request) { request.ambient_rays = 2; }, "leave out ambient_rays");
+  expect_refusal(
+      [](FrameRequest &request) {
+        request.ambient_rays = 2;
+        for (SurfaceStyle &surface : request.surfaces) surface.opacity = 0.9f;
+      },
+      "end at surfaces of opacity 1, and there is none");
   expect_refusal([](FrameRequest &request) { request.bound = FieldBound::kLower; },
                  "leave out bound");
   expect_refusal([](FrameRequest &request) { request.max_surface_error = 1; },

@@ -398,7 +398,12 @@ TEST(Slices, BadOnesAreRefused) {
   expect_refused([&](FrameRequest &r) { r.slices.planes.resize(7, plane_of(r)); },
                  "2 surfaces and 7 slices are more");
   expect_refused([&](FrameRequest &r) { r.surfaces.clear(); }, "give a surface");
-  expect_refused([&](FrameRequest &r) { r.ambient_rays = 3; }, "slices are drawn without ambient");
+  expect_refused(
+      [&](FrameRequest &r) {
+        r.ambient_rays = 3;
+        for (SurfaceStyle &surface : r.surfaces) surface.opacity = 0.5f;
+      },
+      "surfaces of opacity 1, and there is none");
 }
 
 }  // namespace

@@ -36,7 +36,7 @@ struct Blending {
     for (std::size_t ray = 0; ray < hits.size(); ++ray) {
       if (!std::isfinite(hits[ray].t) || !goes_on(colors[ray])) continue;
       colors[ray] = blend_hit(&frame, &light.params, light.color_map.data(), &surfaces,
-                              static_cast<uint>(ray), hits[ray], 0, colors[ray]);
+                              static_cast<uint>(ray), hits[ray], 0, 1, 1, colors[ray]);
       ++count;
     }
     return count;

@@ -24,11 +24,10 @@ void check_choices(const FrameRequest &request) {
     };
     leave_out(request.bound != FieldBound::kNone, "bound");
     leave_out(request.voxel_pixels != 0, "voxel_pixels");
-    leave_out(request.ambient_rays != 0, "ambient_rays");
-    leave_out(request.shadow_rays != 0, "shadow_rays");
     leave_out(request.field_values, "colours by a field");
     leave_out(request.max_surface_error.has_value(), "max_surface_error");
     leave_out(request.time_budget_ms.has_value(), "time_budget_ms");
+    if (light_rays_of(request).count() != 0) check_some_are_opaque(request.surfaces);
   }
   if (request.field_values && request.time_budget_ms)
     throw Error("colours by a field are drawn without a time budget: leave out one of the two");
@@ -88,6 +87,9 @@ void check(const FrameRequest &request, const Abilities &abilities) {
   need(request.field_values, abilities.field,
        abilities.cells ? "this renderer has no field to colour by: make it with one"
                        : "a team draws without colours by a field: leave them out");
+  need(!request.surfaces.empty() && light_rays_of(request).count() != 0, abilities.cells,
+       "a team draws several or translucent surfaces without ambient and shadow rays: leave them "
+       "out");
   need(!request.slices.planes.empty(), abilities.cells,
        "a team draws without slices: leave them out");
   need(!request.surfaces.empty() && request.on_pass && !abilities.cells, false,

@@ -39,6 +39,9 @@ struct Slices {
 ///         degenerate, or whose range of values is
 void check_surfaces(const std::vector<SurfaceStyle> &surfaces, const Slices &slices = {});
 
+/// Throws  Error: none of the surfaces is opaque, so ambient and shadow rays end nowhere
+void check_some_are_opaque(const std::vector<SurfaceStyle> &surfaces);
+
 /// The numbers of surfaces, those of larger isovalues first: the order in which layers prefer hits
 /// at one place.
 std::vector<std::uint32_t> innermost_first(const std::vector<SurfaceStyle> &surfaces);

@@ -138,10 +138,47 @@ inline float slice_value(const LayerBlend &by, const HostLevel &level, const Hit
                                       : 0.0f;
 }
 
+/// The shares of the sky and of the scene's light that a hit sees.
+struct HitLight {
+  float open = 1, lit = 1;
+};
+
+template <auto kTraceRay>
+inline HitLight light_of_hit(std::span<const HostLevel> surfaces, const LayerBlend &by, uint ray_id,
+                             const HitRecord &hit) {
+  HitLight light;
+  const AmbientRays &rays = by.rays;
+  if (rays.num_rays == 0 || is_of_slice(&by.colors, hit)) return light;
+  const FrameParams &seen = surfaces.front().frame;
+  const LastPlanes last = last_planes(&seen);
+  const HitRecord placed = placed_hit(&seen, 0, hit);
+  const uint pattern = ambient_pattern(&seen, ray_id);
+  HitRecord met;
+  uint num_open[2] = {0, 0};
+  for (uint k = 0; k < rays.num_rays; ++k) {
+    const GivenRay given = ambient_ray(&seen, &rays.params, placed, ray_id, k,
+                                       rays.directions[k * ISO_AMBIENT_PATTERNS + pattern]);
+    if (!is_given(given)) continue;
+    const Ray ray = make_given_ray(given);
+    num_open[is_shadow_ray(&rays.params, k)] += std::ranges::none_of(by.opaque, [&](auto place) {
+      const HostLevel &surface = surfaces[place];
+      return kTraceRay(surface.frame, surface.field, active_box(surface.frame.surface, last), last,
+                       ray, &met) &&
+             (surface.clip == nullptr ||
+              !is_clipped(surface.clip, given, rays.voxel, met.t / seen.view.t_scale));
+    });
+  }
+  const uchar counts[2] = {static_cast<uchar>(num_open[0]), static_cast<uchar>(num_open[1])};
+  const uint num_ambient = rays.params.num_ambient;
+  light.open = open_share(counts, 0, num_ambient);
+  light.lit = open_share(counts, 1, rays.num_rays - num_ambient);
+  return light;
+}
+
 /// Blends the layers of some of eight rays. The other arguments are those of HostLoops::blend().
 ///
 /// next  [lane] [surface] their first hits; overwritten
-template <auto kTraceBehind, auto kSmooth>
+template <auto kTraceBehind, auto kSmooth, auto kTraceRay>
 inline uint blend_packet(std::span<const HostLevel> surfaces, const LayerBlend &by,
                          const LayerPacket &packet, uint lanes, HitRecord *const *next,
                          HitRecord *hits, RayColor *colors, LayerStats *stats) {
@@ -177,8 +214,10 @@ inline uint blend_packet(std::span<const HostLevel> surfaces, const LayerBlend &
         passed[lane] |= 1u << (surface_of(hit) - by.colors.num_surfaces);
       }
       const float value = slice_value(by, surface, hit);
-      colors[ray_id] = blend_hit(&surface.frame, &by.shading.params, by.shading.color_map.data(),
-                                 &by.colors, ray_id, hit, value, colors[ray_id]);
+      const HitLight light = light_of_hit<kTraceRay>(surfaces, by, ray_id, hit);
+      colors[ray_id] =
+          blend_hit(&surface.frame, &by.shading.params, by.shading.color_map.data(), &by.colors,
+                    ray_id, hit, value, light.open, light.lit, colors[ray_id]);
       if (goes_on(colors[ray_id])) (is_slice ? on_behind_slices : on[nearest]) |= 1u << lane;
       if (is_unseen(&by.colors, hit, value)) continue;
       if (hits[ray_id].t == INFINITY) {
@@ -203,7 +242,7 @@ inline uint blend_packet(std::span<const HostLevel> surfaces, const LayerBlend &
   return num_hits;
 }
 
-template <auto kTraceBehind, auto kSmooth>
+template <auto kTraceBehind, auto kSmooth, auto kTraceRay>
 inline uint blend(std::span<const HostLevel> surfaces, const LayerBlend &by, const RayTile &tile,
                   HitRecord *next, HitRecord *hits, RayColor *colors, LayerStats *stats) {
   const uint columns = tile.end_x - tile.begin_x;
@@ -218,9 +257,9 @@ inline uint blend(std::span<const HostLevel> surfaces, const LayerBlend &by, con
         of_lanes[lane] = next + surfaces.size() * (column + columns * row);
         lanes |= 1u << lane;
       }
-      num_hits += blend_packet<kTraceBehind, kSmooth>(surfaces, by,
-                                                      {x, y, surfaces.front().frame.view.width},
-                                                      lanes, of_lanes, hits, colors, stats);
+      num_hits += blend_packet<kTraceBehind, kSmooth, kTraceRay>(
+          surfaces, by, {x, y, surfaces.front().frame.view.width}, lanes, of_lanes, hits, colors,
+          stats);
     }
   }
   return num_hits;

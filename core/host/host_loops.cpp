@@ -227,8 +227,8 @@ ISO_OF_ITS_OWN ISO_WHOLE_LOOP bool trace_ray_behind_anywhere(const HostLevel &su
 ISO_WHOLE_LOOP uint blend_rays_anywhere(std::span<const HostLevel> surfaces, const LayerBlend &by,
                                         const RayTile &tile, HitRecord *next, HitRecord *hits,
                                         RayColor *colors, LayerStats *stats) {
-  return blend<trace_rays_behind<trace_ray_behind_anywhere>, smooth_hit_anywhere>(
-      surfaces, by, tile, next, hits, colors, stats);
+  return blend<trace_rays_behind<trace_ray_behind_anywhere>, smooth_hit_anywhere,
+               trace_ray_anywhere>(surfaces, by, tile, next, hits, colors, stats);
 }
 ISO_WHOLE_LOOP void shade_layers_anywhere(const FrameParams &frame, const ShadeParams &params,
                                           uint samples, uint row, const RayColor *colors,
@@ -313,14 +313,14 @@ ISO_OF_ITS_OWN ISO_WIDE_LOOP bool trace_ray_in_cell_wide(const HostLevel &surfac
 ISO_WIDE_LOOP uint blend_wide(std::span<const HostLevel> surfaces, const LayerBlend &by,
                               const RayTile &tile, HitRecord *next, HitRecord *hits,
                               RayColor *colors, LayerStats *stats) {
-  return blend<trace_packets_behind<trace_ray_in_cell_wide, trace_packet_behind>, smooth_hit_wide>(
-      surfaces, by, tile, next, hits, colors, stats);
+  return blend<trace_packets_behind<trace_ray_in_cell_wide, trace_packet_behind>, smooth_hit_wide,
+               trace_ray_wide>(surfaces, by, tile, next, hits, colors, stats);
 }
 ISO_WIDE_LOOP uint blend_rays_wide(std::span<const HostLevel> surfaces, const LayerBlend &by,
                                    const RayTile &tile, HitRecord *next, HitRecord *hits,
                                    RayColor *colors, LayerStats *stats) {
-  return blend<trace_rays_behind<trace_ray_behind_wide>, smooth_hit_wide>(surfaces, by, tile, next,
-                                                                          hits, colors, stats);
+  return blend<trace_rays_behind<trace_ray_behind_wide>, smooth_hit_wide, trace_ray_wide>(
+      surfaces, by, tile, next, hits, colors, stats);
 }
 ISO_WIDE_LOOP void shade_layers_wide(const FrameParams &frame, const ShadeParams &params,
                                      uint samples, uint row, const RayColor *colors,
@@ -348,7 +348,8 @@ ISO_OF_ITS_OWN ISO_WHOLE_LOOP bool trace_ray_in_cell_anywhere(const HostLevel &s
 uint blend_sse4(std::span<const HostLevel> surfaces, const LayerBlend &by, const RayTile &tile,
                 HitRecord *next, HitRecord *hits, RayColor *colors, LayerStats *stats) {
   return blend<trace_packets_behind<trace_ray_in_cell_anywhere, trace_packet_behind_sse4>,
-               smooth_hit_anywhere>(surfaces, by, tile, next, hits, colors, stats);
+               smooth_hit_anywhere, trace_ray_anywhere>(surfaces, by, tile, next, hits, colors,
+                                                        stats);
 }
 
 /// With fused multiply-add, single rays are faster.

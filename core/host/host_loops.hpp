@@ -129,6 +129,8 @@ struct LayerBlend {
   bool is_smooth;                      ///< Normals::kSmooth
   ClipParams clip;                     ///< of slices
   FieldMap slice_map;                  ///< from hits on slices to the volume
+  AmbientRays rays;                    ///< of the hits of each layer
+  std::vector<std::size_t> opaque;     ///< the surfaces that such rays may meet
 };
 
 struct HostLoops {

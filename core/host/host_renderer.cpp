@@ -175,7 +175,20 @@ void HostRenderer::draw_surfaces(const FrameRequest &request, const FrameParams 
       innermost_first(request.surfaces),
       request.normals == Normals::kSmooth,
       make_clip_params(info_, frame.view, request.camera, request.clip),
-      make_field_map({&info_, 1}, info_)};
+      make_field_map({&info_, 1}, info_),
+      {},
+      {}};
+  const LightRays light_rays = light_rays_of(request);
+  const std::vector<AmbientDirection> directions = make_light_directions(light_rays);
+  by.rays = {make_ambient_params(info_, light_rays.num_ambient),
+             directions.data(),
+             light_rays.count(),
+             &frame,
+             0,
+             1};
+  for (std::size_t k = 0; k < by.numbers.size(); ++k) {
+    if (request.surfaces[by.numbers[k]].opacity == 1) by.opaque.push_back(k);
+  }
   by.slice_map.first_surface = by.colors.num_surfaces;
   std::vector<float> isovalues;
   for (const std::uint32_t number : by.numbers)

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 #include "core/render/device_renderer.hpp"
 
@@ -43,10 +44,11 @@ void DeviceRenderer::draw_layers(const FrameRequest &request, Frame &frame) {
   has_layers_ = true;
   const ClipParams clip = make_clip_params(finest, rays_.frame.view, request.camera, request.clip);
   const std::size_t num_surfaces = find_first_hits(request, clip, isovalues, frame);
+  isovalues.resize(num_surfaces);
   stats.rays_hit = 0;
   for (std::uint32_t layer = 0;; ++layer) {
     rays_.set_clip(clip);
-    const LayerCounts counts = draw_layer(layer, num_surfaces, request, frame);
+    const LayerCounts counts = draw_layer(layer, request, clip, isovalues, frame);
     stats.rays_hit += counts.first_hits;
     if (layer == ISO_MAX_LAYERS) {
       stats.layers.rays_cut = counts.hits;
@@ -101,25 +103,48 @@ std::size_t DeviceRenderer::find_first_hits(const FrameRequest &request, const C
   return num_surfaces;
 }
 
+/// Casts ambient and shadow rays from the hits of a layer, in rays_.hits. They may meet opaque
+/// surfaces.
+void DeviceRenderer::light_layer(const FrameRequest &request, const ClipParams &clip,
+                                 std::span<const float> isovalues, Frame &frame) {
+  const std::uint32_t num_rounds = light_rays_of(request).count();
+  for (std::uint32_t round = 0; round < num_rounds; ++round) {
+    bool goes_on = false;
+    for (std::size_t place = 0; place < isovalues.size() && !frame.stats.cancelled; ++place) {
+      if (request.surfaces[layers_->surface_at(place)].opacity < 1) continue;
+      show_surface(request, clip, place, isovalues[place]);
+      rays_.frame.screen = layers_screen_;  // of all hits
+      ambient_round_->set_round(round, std::exchange(goes_on, true));
+      run(*ambient_round_, frame);
+      ambient_->block(rays_);
+    }
+  }
+  if (!frame.stats.cancelled) (*ambient_)(rays_, num_rounds);
+}
+
 /// Behind the last layer that is drawn, hits are counted alone.
-LayerCounts DeviceRenderer::draw_layer(std::uint32_t layer, std::size_t num_surfaces,
-                                       const FrameRequest &request, Frame &frame) {
+LayerCounts DeviceRenderer::draw_layer(std::uint32_t layer, const FrameRequest &request,
+                                       const ClipParams &clip, std::span<const float> isovalues,
+                                       Frame &frame) {
   const bool is_further = layer != 0, is_drawn = layer < ISO_MAX_LAYERS;
+  const bool is_lit = is_drawn && light_rays_of(request).count() != 0,
+             is_smooth = is_drawn && request.normals == Normals::kSmooth;
   if (is_further) layers_->swap_layer(rays_);
   is_in_further_layer_ = is_further;
-  layers_->choose(rays_, num_surfaces, !is_further);
+  rays_.num_ambient = rays_.num_shadow = 0;
+  if (is_further && is_lit) layers_->forget_hits(rays_);
+  layers_->choose(rays_, isovalues.size(), !is_further);
   rays_.frame.screen = layers_screen_;
   if (is_drawn && !request.slices.planes.empty()) {
     slice_values_->set_layer(!is_further, static_cast<std::uint32_t>(request.surfaces.size()));
     run(*slice_values_, frame);
     if (frame.stats.cancelled) rays_.field_values.fill(no_value());
   }
-  if (is_drawn && request.normals == Normals::kSmooth) {
-    const bool previews = !is_further && frame.on_pass;
-    if (previews) layers_->blend(rays_, true, ISO_PREVIEWS);
-    run(is_further ? static_cast<Wave &>(*layer_normals_) : normals_of_camera_, frame);
-    if (previews) layers_->clear(rays_);
-  }
+  const bool previews = !is_further && frame.on_pass && (is_smooth || is_lit);
+  if (previews) layers_->blend(rays_, true, ISO_PREVIEWS);
+  if (is_smooth) run(is_further ? static_cast<Wave &>(*layer_normals_) : normals_of_camera_, frame);
+  if (is_lit) light_layer(request, clip, isovalues, frame);
+  if (previews) layers_->clear(rays_);
   const LayerCounts counts =
       layers_->blend(rays_, !is_further, is_drawn ? ISO_BLENDS : ISO_COUNTS_ALONE);
   if (layer_hits_ != nullptr) layer_hits_->push_back(layers_->read(rays_, !is_further));

@@ -66,17 +66,20 @@ FrameStats DeviceRenderer::render(const FrameRequest &request) {
   begin_frame(request);
   frame.stats.first_level = blocks_.drawing.first;
   frame.stats.last_level = blocks_.drawing.end - 1;
+  if (light_rays.count() != 0)
+    ambient_->begin(blocks_.levels[blocks_.drawing.first].info, blocks_.drawing.first, light_rays,
+                    static_cast<std::uint32_t>(std::max<std::size_t>(request.surfaces.size(), 1)));
   if (request.surfaces.empty()) {
     draw_surface(request, frame);
   } else {
     draw_layers(request, frame);
   }
   if (request.field_values) run(*field_, frame);
-  if (light_rays.count() != 0)
-    ambient_->begin(blocks_.levels[blocks_.drawing.first].info, blocks_.drawing.first, light_rays);
-  for (std::uint32_t round = 0; round < light_rays.count(); ++round) cast_round(round, frame);
   FrameStats &stats = frame.stats;
-  if (light_rays.count() != 0 && !stats.cancelled) (*ambient_)(rays_, light_rays.count());
+  if (request.surfaces.empty() && light_rays.count() != 0) {
+    for (std::uint32_t round = 0; round < light_rays.count(); ++round) cast_round(round, frame);
+    if (!stats.cancelled) (*ambient_)(rays_, light_rays.count());
+  }
   blocks_.close(recycled_blocks(stats, !request.slices.planes.empty()), stats.cancelled);
   rays_.frame = blocks_.levels[0].frame;  // for shading
   const Uploads after = blocks_.uploads();
@@ -217,6 +220,7 @@ void DeviceRenderer::compile_kernels() {
     }
     if (field_) waves.push_back(&*field_);
     if (ambient_round_) waves.push_back(&*ambient_round_);
+    if (ambient_ && behind_ && num_levels == 1) ambient_->block(rays);
     for (Wave *wave : waves) {
       wave->begin();
       for (int pass = 0; pass < 2; ++pass) wave->enqueue_pass();  // the first decodes nothing

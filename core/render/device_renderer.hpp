@@ -169,8 +169,10 @@ class DeviceRenderer : public Renderer {
                     float isovalue);
   std::size_t find_first_hits(const FrameRequest &request, const ClipParams &clip,
                               std::span<const float> isovalues, Frame &frame);
-  LayerCounts draw_layer(std::uint32_t layer, std::size_t num_surfaces, const FrameRequest &request,
-                         Frame &frame);
+  void light_layer(const FrameRequest &request, const ClipParams &clip,
+                   std::span<const float> isovalues, Frame &frame);
+  LayerCounts draw_layer(std::uint32_t layer, const FrameRequest &request, const ClipParams &clip,
+                         std::span<const float> isovalues, Frame &frame);
   void find_hits_behind(const FrameRequest &request, const ClipParams &clip,
                         std::span<const float> isovalues, const LayerCounts &counts,
                         bool is_first_layer, Frame &frame);

@@ -133,7 +133,7 @@ void SliceValuesWave::enqueue_pass() {
 }
 
 void AmbientRound::begin() {
-  {
+  if (!goes_on_) {
     const auto stage = blocks_.device.timer().stage("ambient");
     ambient_(rays_, round_);
   }

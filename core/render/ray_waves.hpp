@@ -147,14 +147,19 @@ class SliceValuesWave : public Wave {
   bool begins_ = false;  ///< the next pass is the first of all rays
 };
 
-/// A round of ambient rays: casts one ray from each hit.
+/// A round of ambient rays: casts one ray from each hit. In frames of several surfaces, it is run
+/// once for each surface that the rays may meet.
 class AmbientRound : public Wave {
  public:
   /// given: the wave of RaySource::kGiven.
   AmbientRound(BlockStore &blocks, Wavefront &rays, Ambient &ambient, RaysWave &given)
       : blocks_(blocks), rays_(rays), ambient_(ambient), given_(given) {}
 
-  void set_round(std::uint32_t round) { round_ = round; }
+  /// goes_on  the rays of the round have been made already, for another surface
+  void set_round(std::uint32_t round, bool goes_on = false) {
+    round_ = round;
+    goes_on_ = goes_on;
+  }
   void begin() override;
   void enqueue_pass() override { given_.enqueue_pass(); }
   LaterPasses *sum_in(FrameStats &stats) const override { return &stats.ambient; }
@@ -165,6 +170,7 @@ class AmbientRound : public Wave {
   Ambient &ambient_;
   RaysWave &given_;
   std::uint32_t round_ = 0;
+  bool goes_on_ = false;
 };
 
 }  // namespace isowave::core

@@ -22,10 +22,13 @@ ocl::BufferSizes Ambient::sizes() {
 Ambient::Ambient(ocl::Device &device, std::uint64_t num_pixels, bool levels, bool placed)
     : range_(ocl::Range::strided(num_pixels, ocl::kGroupSize, device)),
       directions_(device, sizes()["ambient directions"]),
-      kernel_(device, defines_of(placed), levels) {}
+      kernel_(device, defines_of(placed), levels),
+      block_(device, defines_of(placed)) {}
 
-void Ambient::begin(const VolumeInfo &info, std::size_t level, const LightRays &light_rays) {
+void Ambient::begin(const VolumeInfo &info, std::size_t level, const LightRays &light_rays,
+                    std::uint32_t num_surfaces) {
   level_ = static_cast<uint>(level);
+  num_surfaces_ = num_surfaces;
   params_ = make_ambient_params(info, light_rays.num_ambient);
   if (light_rays == light_rays_) return;
   directions_.write(make_light_directions(light_rays));
@@ -34,10 +37,14 @@ void Ambient::begin(const VolumeInfo &info, std::size_t level, const LightRays &
 
 void Ambient::operator()(Wavefront &rays, std::uint32_t round) {
   kernel_.of(rays)(range_, rays.frame, rays.level_frames, rays.num_level_frames, rays.clip, level_,
-                   params_, directions_, round, light_rays_.count(), rays.hits, rays.given_hits,
-                   rays.given, rays.open_counts);
+                   params_, directions_, round, light_rays_.count(), num_surfaces_, rays.hits,
+                   rays.given_hits, rays.given, rays.open_counts);
   rays.num_ambient = std::min(round, light_rays_.num_ambient);
   rays.num_shadow = round - rays.num_ambient;
+}
+
+void Ambient::block(Wavefront &rays) {
+  block_(range_, rays.frame, rays.clip, level_, rays.given, rays.given_hits);
 }
 
 }  // namespace isowave::core

@@ -18,9 +18,11 @@ class Ambient {
 
   /// Before the rounds of a frame.
   ///
-  /// level  the finest level of detail that draws, whose grid is `info`
-  /// Waits  if the rays differ from those of the frame before
-  void begin(const VolumeInfo &info, std::size_t level, const LightRays &light_rays);
+  /// level         the finest level of detail that draws, whose grid is `info`
+  /// num_surfaces  hits of surfaces of greater numbers have no rays
+  /// Waits         if the rays differ from those of the frame before
+  void begin(const VolumeInfo &info, std::size_t level, const LightRays &light_rays,
+             std::uint32_t num_surfaces = 1);
 
   /// Counts the rays of round - 1 that met nothing, and makes the rays of a round, unless it is the
   /// last: the number of begin()'s rays.
@@ -30,13 +32,20 @@ class Ambient {
   /// Waits  no
   void operator()(Wavefront &rays, std::uint32_t round);
 
+  /// Takes out the rays of the round that have met a surface, before they go to the next one.
+  ///
+  /// In, Out  rays.given, rays.given_hits
+  /// Waits    no
+  void block(Wavefront &rays);
+
  private:
   ocl::Range range_;
   ocl::Buffer<AmbientDirection> directions_;
   LightRays light_rays_{};
   AmbientParams params_{};
-  uint level_ = 0;
+  uint level_ = 0, num_surfaces_ = 1;
   LevelledKernel<kernels::ambient> kernel_;
+  ocl::Kernel<kernels::ambient_block> block_;
 };
 
 }  // namespace isowave::core

@@ -46,6 +46,7 @@ Layers::Layers(ocl::Device &device, const Limits &limits, const ocl::BufferSizes
       counts_(device, sizes["layer counts"]),
       next_counts_(device, sizes["layer counts, next"]),
       choose_(device, group_defines(group_size)),
+      forget_(device, group_defines(group_size)),
       blend_(device, group_defines(group_size)),
       begin_(device, group_defines(group_size)) {
   for (std::uint32_t surface = 0; surface < limits.max_surfaces; ++surface)
@@ -57,6 +58,7 @@ void Layers::compile(Wavefront &rays) {
   static constexpr LayerParams kNone{};
   params_.write({&kNone, 1});
   clear(rays);
+  forget_hits(rays);
   choose(rays, 1, true);
   blend(rays, true);
 }
@@ -79,12 +81,17 @@ void Layers::clear(const Wavefront &rays) {
   colors.fill(clear_ray(), 0, std::size_t{rays.frame.view.width} * rays.frame.view.height);
 }
 
+void Layers::forget_hits(Wavefront &rays) {
+  forget_(range_, rays.frame, rays.hits);
+}
+
 LayerCounts Layers::blend(Wavefront &rays, bool is_first, uint how) {
   static constexpr LayerCounts kNone{};
   next_counts_.write_async({&kNone, 1});
   // While rays.hits are those of a further layer, those of the first are in further_hits_.
   blend_(range_, rays.frame, light_, color_map_, how, is_first ? 1 : 0, params_, counts_, listed_,
-         rays.field_values, rays.hits, further_hits_, passed_, colors, next_counts_, next_listed_);
+         rays.field_values, rays.open_counts, rays.num_ambient, rays.num_shadow, rays.hits,
+         further_hits_, passed_, colors, next_counts_, next_listed_);
   return next_counts_.read().front();
 }
 

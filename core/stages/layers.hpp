@@ -53,12 +53,15 @@ class Layers {
   /// is_first  the frame's first layer; otherwise of the rays that next_layer() has taken
   /// Waits     no
   void choose(Wavefront &rays, std::size_t num_surfaces, bool is_first);
+  /// Makes rays.hits, those of a further layer, no_hit(). Does not wait.
+  void forget_hits(Wavefront &rays);
   /// Forgets the colours. Does not wait.
   void clear(const Wavefront &rays);
   /// Blends rays.hits into the colours, and lists the rays that go on.
   ///
   /// how    ISO_BLENDS, ISO_PREVIEWS or ISO_COUNTS_ALONE
-  /// In     rays.field_values of hits on slices
+  /// In     rays.field_values of hits on slices; rays.open_counts, num_ambient and num_shadow of
+  ///        the hits
   /// Waits  yes
   LayerCounts blend(Wavefront &rays, bool is_first, uint how = ISO_BLENDS);
   /// The hits of rays.hits, after blend() and before next_layer().
@@ -100,6 +103,7 @@ class Layers {
   std::vector<std::uint32_t> order_;
   ShadeParams light_{};
   ocl::Kernel<kernels::layers_choose> choose_;
+  ocl::Kernel<kernels::layers_forget> forget_;
   ocl::Kernel<kernels::layers_blend> blend_;
   ocl::Kernel<kernels::layers_begin> begin_;
 };

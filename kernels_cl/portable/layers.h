@@ -149,10 +149,11 @@ ISO_INLINE int is_unseen(ISO_GLOBAL const LayerParams *layers, HitRecord hit, fl
 /// p          its surface colour is not used
 /// color_map  as surface_color()
 /// value      of the voxels at the hit; only read if it is on a slice
+/// open, lit  as shade_ray()
 ISO_INLINE RayColor blend_hit(const FrameParams *frame, const ShadeParams *p,
                               ISO_GLOBAL const uint *color_map,
                               ISO_GLOBAL const LayerParams *layers, uint ray_id, HitRecord hit,
-                              float value, RayColor seen) {
+                              float value, float open, float lit, RayColor seen) {
   ISO_GLOBAL const SurfaceColor *surface = &layers->surfaces[surface_of(hit)];
   Color color;
   float share;
@@ -164,7 +165,7 @@ ISO_INLINE RayColor blend_hit(const FrameParams *frame, const ShadeParams *p,
     color.g = surface->g;
     color.b = surface->b;
     color = surface_color(frame, p, color_map, ray_id, hit.t, 0.0f, color);
-    color = shade_ray(frame, p, color, ray_id, hit.grad_x, hit.grad_y, hit.grad_z, 1.0f, 1.0f);
+    color = shade_ray(frame, p, color, ray_id, hit.grad_x, hit.grad_y, hit.grad_z, open, lit);
   }
   share = seen.transmittance * surface->opacity;
   seen.r = fma(share, color.r, seen.r);

@@ -173,6 +173,13 @@ ISO_INLINE Color shade_ray(const FrameParams *frame, const ShadeParams *p, Color
                     fma(surface.b, light, highlight));
 }
 
+/// The share of a hit's light rays that met nothing.
+///
+/// num_rays  of the hit; 0: there are none, and all is open
+ISO_INLINE float open_share(ISO_GLOBAL const uchar *open_counts, uint place, uint num_rays) {
+  return num_rays == 0 ? 1.0f : (float)open_counts[place] / (float)num_rays;
+}
+
 /// RGBA of the pixel at a column and row of the picture, 8 bits each, red in bits 0..7. The pixel
 /// has samples times samples rays of the frame. If pictures are transparent, the colour is the mean
 /// of the rays that hit, and A is their share of all rays (straight alpha); 0 0 0 0 if none hits.
@@ -203,11 +210,11 @@ ISO_INLINE uint shade_pixel(const FrameParams *frame, const ShadeParams *p,
     Color color = behind;
     if (hits[ray_id].t != INFINITY) {
       const float value = p->has_map == ISO_MAP_BY_FIELD ? values[ray_id] : 0.0f;
-      color = shade_ray(
-          frame, p, surface_color(frame, p, color_map, ray_id, hits[ray_id].t, value, own), ray_id,
-          hits[ray_id].grad_x, hits[ray_id].grad_y, hits[ray_id].grad_z,
-          num_ambient == 0 ? 1.0f : (float)open_counts[ray_id] / (float)num_ambient,
-          num_shadow == 0 ? 1.0f : (float)open_counts[frame_rays + ray_id] / (float)num_shadow);
+      color = shade_ray(frame, p,
+                        surface_color(frame, p, color_map, ray_id, hits[ray_id].t, value, own),
+                        ray_id, hits[ray_id].grad_x, hits[ray_id].grad_y, hits[ray_id].grad_z,
+                        open_share(open_counts, ray_id, num_ambient),
+                        open_share(open_counts, frame_rays + ray_id, num_shadow));
       ++num_hits;
     }
     r += color.r;

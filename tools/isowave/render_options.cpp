@@ -121,9 +121,8 @@ void check_slice_options(const CLI::App &command, const RenderArgs &options, con
     throw Error("{} surfaces and {} slices are more than a frame can have: give at most {}",
                 num_surfaces, num_slices, ISO_MAX_SURFACES);
   if (team.size() > 1) throw Error("--slice: a team draws without slices");
-  refuse_options(
-      command, {"--ambient", "--shadow", "--voxel-pixels", "--max-surface-error", "--time-budget"},
-      "--slice draws without it: leave out either");
+  refuse_options(command, {"--voxel-pixels", "--max-surface-error", "--time-budget"},
+                 "--slice draws without it: leave out either");
   if (options.renderer_flags.pipeline == "blocks")
     refuse_options(command, {"--slice"}, "--pipeline blocks draws one opaque surface");
   if (solver_from_string(options.renderer_flags.solver).kind != kDefaultSolver.kind)
@@ -136,9 +135,14 @@ void check_surface_options(const CLI::App &command, const RenderArgs &options, c
   refuse_options(command, {"--isovalue"},
                  "draws pictures of one surface each, --surface one of all: leave out either");
   refuse_options(command, {"--color"}, "surfaces have colours of their own: --surface VALUE,COLOR");
-  refuse_options(
-      command, {"--ambient", "--shadow", "--voxel-pixels", "--max-surface-error", "--time-budget"},
-      "--surface draws without it: leave it out, or draw one surface by --isovalue");
+  refuse_options(command, {"--voxel-pixels", "--max-surface-error", "--time-budget"},
+                 "--surface draws without it: leave it out, or draw one surface by --isovalue");
+  if (options.ambient_rays != 0 || options.light.shadow_rays != 0) {
+    if (team.size() > 1)
+      refuse_options(command, {"--ambient", "--shadow"},
+                     "with mpirun, --surface draws without it: leave out either");
+    check_some_are_opaque(options.surfaces);
+  }
   if (options.renderer_flags.pipeline == "blocks")
     refuse_options(command, {"--surface"}, "--pipeline blocks draws one opaque surface");
   if (solver_from_string(options.renderer_flags.solver).kind != kDefaultSolver.kind)

@@ -307,7 +307,8 @@ class Renderer:
             open. A `max_error` by proof and the output "bounds" need whole surfaces.
         surfaces
             Up to 8 surfaces in one picture, instead of `isovalue` and `color`: see Surface. Needs
-            surfaces= of the constructor; not with max_error, voxel_pixels, time_budget, ambient.
+            surfaces= of the constructor; not with max_error, voxel_pixels, time_budget. Rays of
+            `ambient` and shadows end at those of opacity 1.
         slices, slice_map
             Planes that show the voxels beside the surfaces, see Slice: up to 8 with them, with
             their conditions. A ColorMap gives colours and range [the volume's]; the rest of it is

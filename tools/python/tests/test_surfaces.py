@@ -181,7 +181,8 @@ def test_surfaces_that_cannot_be_drawn_are_refused(ball: isowave.Volume) -> None
     refuse("isovalue and surfaces: give one of both", isovalue=0)
     refuse("give an isovalue, or surfaces", [])
     refuse("color: surfaces have colours of their own", color="red")
-    refuse("leave out ambient_rays", ambient=1)
+    glass = [Surface(0, opacity=0.5), Surface(1, opacity=0.9)]
+    refuse("end at surfaces of opacity 1, and there is none", glass, ambient=1)
     refuse("leave out voxel_pixels", voxel_pixels=1)
     refuse("leave out max_surface_error", max_error=1)
     refuse("leave out time_budget_ms", time_budget=1)

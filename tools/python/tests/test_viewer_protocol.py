@@ -152,8 +152,8 @@ BAD_WISHES: list[tuple[dict[str, Any], str]] = [
     ({**PLAIN, "surfaces": [{**SURFACE, "opacity": 1.1}]}, "opacity must be a number from 0.001"),
     ({**PLAIN, "surfaces": [SURFACE], "max_error": 1}, "surfaces are drawn without max_error"),
     ({**PLAIN, "surfaces": [SURFACE], "time_budget": 9}, "are drawn without time_budget"),
-    ({**PLAIN, "surfaces": [SURFACE], "ambient": 8}, "surfaces are drawn without ambient"),
-    ({**PLAIN, "surfaces": [SURFACE], **LIT}, "surfaces are drawn without shadow"),
+    ({**PLAIN, "surfaces": [SURFACE], "ambient": 8}, "ambient needs a surface of opacity 1"),
+    ({**PLAIN, "surfaces": [SURFACE], **LIT}, "shadow needs a surface of opacity 1"),
     (
         {**PLAIN, "surfaces": [SURFACE], "color_map": {**COLOR_MAP, "by": "caps"}},
         "colours by the field are drawn without surfaces",

@@ -59,12 +59,11 @@ export function lightOf({ eye, at, up }) {
   return unit(add(back, cross(back, right)));
 }
 
-/** What a wish says of colours and lights. Only one opaque surface has shadows, or the colours of
- * a field. */
+/** What a wish says of colours and lights. Only one opaque surface has the colours of a field. */
 export function lookOf({ surfaces, color_map: map, lights, light, shadow }) {
   const isAlone = isPlain(surfaces);
   return { color_map: isAlone || map?.by === "axis" ? map : null, lights, light,
-    shadow: isAlone && light ? shadow : null };
+    shadow: hasOpaque(surfaces) && light ? shadow : null };
 }
 
 /** Parts of a URL's hash. */
@@ -175,12 +174,12 @@ class Look {
 
   show({ surfaces, color_map: map, planes: { length: count }, light, shadow }) {
     const { view } = this;
-    const isAlone = isPlain(surfaces);
+    const hasShadow = light !== null && hasOpaque(surfaces);
     view.field("light").value = light ? "stays" : "";
     view.field("shadow").value = !shadow ? "" : shadow.rays === 1 ? "1" : "16";
-    view.field("shadow").disabled = !light || !isAlone;
+    view.field("shadow").disabled = !hasShadow;
     view.set("light_angle", shadow?.angle ?? LIGHT_ANGLE);
-    view.field("light_angle").disabled = !light || !isAlone || !(shadow?.rays > 1);
+    view.field("light_angle").disabled = !hasShadow || !(shadow?.rays > 1);
     view.field("color_map").value = map?.colors ?? "";
     view.field("color_by").value = map ? byName(map) : "z";
     for (const field of [view.field("color_by"), ...this.ends]) field.disabled = !map;

@@ -20,7 +20,8 @@ looks nowhere.
     {"type": "scene", "text": "a scene file's"}
 
 Without surfaces, one opaque surface is drawn, of the wish's isovalue and color. Surfaces come in
-place of these, and without max_error, time_budget, ambient rays, shadow and colours by the field.
+place of these, and without max_error, time_budget and colours by the field. Ambient rays and shadow
+need one of opacity 1.
 
 Answers are dicts with a "type": welcome, status, histogram, picture (with bytes), bounds, scene,
 error;
@@ -244,10 +245,15 @@ def _surfaces(content: dict[str, Any]) -> tuple[Surface, ...]:
     value = content["surfaces"]
     if not isinstance(value, list) or len(value) > MAX_SURFACES:
         raise ProtocolError(f"surfaces must be a list of at most {MAX_SURFACES} surfaces")
-    for name in ("max_error", "time_budget", "ambient", "shadow"):
+    for name in ("max_error", "time_budget"):
         if value and content[name]:
             raise ProtocolError(f"surfaces are drawn without {name}")
-    return tuple(_surface(surface) for surface in value)
+    surfaces = tuple(_surface(surface) for surface in value)
+    if surfaces and all(surface.opacity < 1 for surface in surfaces):
+        for name in ("ambient", "shadow"):
+            if content[name]:
+                raise ProtocolError(f"{name} needs a surface of opacity 1")
+    return surfaces
 
 
 def _color_map(value: object) -> ColorMap | None:

@@ -9,7 +9,7 @@ const ADDED_OPACITY = 0.5; // what is behind it is seen
 // As the library colours them.
 const COLORS = ["#dbbd87", "#56b4e9", "#d55e00", "#009e73", "#cc79a7", "#0072b2", "#f0e442",
   "#e69f00"];
-const WITHOUT_SURFACES = ["max_error", "by", "time_budget", "ambient"]; // fields of no use then
+const WITHOUT_SURFACES = ["max_error", "by", "time_budget"]; // fields of no use then
 
 /** @returns {Surface} */
 const makeSurface = (isovalue, color = COLORS[0], opacity = 1, shown = true) =>
@@ -20,6 +20,9 @@ export function isPlain(surfaces) {
   const shown = surfaces.filter((s) => s.shown);
   return shown.length === 1 && shown[0].opacity === 1;
 }
+
+/** @returns {boolean} whether ambient and shadow rays can end at a surface */
+export const hasOpaque = (surfaces) => surfaces.some((s) => s.shown && s.opacity === 1);
 
 /** @returns {boolean} whether the values of a second volume are shown, without a time budget */
 const isByField = (map) => map !== null && map.by !== "axis";
@@ -33,7 +36,8 @@ export function wishedSurfaces({ surfaces, max_error, by, time_budget: time, amb
   if (isPlain(surfaces)) return { ...first, surfaces: [], max_error, time_budget, ambient };
   const list = shown.map(({ isovalue, color, opacity }) =>
     ({ isovalue, color: toRgb(color), opacity }));
-  return { ...first, surfaces: list, max_error: null, time_budget: null, ambient: 0 };
+  return { ...first, surfaces: list, max_error: null, time_budget: null,
+    ambient: hasOpaque(surfaces) ? ambient : 0 };
 }
 
 /** The surfaces with one more, at a suggested isovalue or in the middle of the widest gap. */
@@ -150,6 +154,7 @@ class SurfaceList {
     });
     view.field("add").disabled = surfaces.length === MAX_SURFACES;
     for (const name of WITHOUT_SURFACES) view.field(name).disabled = !isPlain(surfaces);
+    view.field("ambient").disabled = !hasOpaque(surfaces);
     if (isByField(map)) view.field("time_budget").disabled = true;
   }
 

@@ -1,0 +1,193 @@
+// Ambient and shadow rays of frames with several surfaces and slices: the hits of every layer have
+// them, and they end at opaque surfaces. Devices and the host must have the twin's pictures.
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "core/host/host_renderer.hpp"
+#include "core/render/device_renderer.hpp"
+#include "core/view/color_maps.hpp"
+#include "reference/twin_renderer.hpp"
+#include "tests/frame_scene.hpp"
+#include "tests/test_devices.hpp"
+
+namespace isowave::core {
+namespace {
+
+using test::expect_same_hits;
+
+constexpr ImageSize kSize{43, 31}, kSmall{11, 9};
+
+CompressedVolume gyroid(const glm::uvec3 &dims, float period) {
+  VolumeInfo info = test::grid_info(dims);
+  info.spacing = {0.5, 0.7, 0.4};
+  info.origin = {3, -20, 11};
+  const std::vector<float> voxels = test::sample(dims, test::gyroid_field(period));
+  ArrayReader reader(info, voxels);
+  return compress(reader, {.rate = 9});
+}
+
+CompressedVolume gyroid() {
+  return gyroid({40, 37, 44}, 11);
+}
+
+ClipPlane through(const VolumeInfo &info, double place, const glm::dvec3 &normal) {
+  const glm::dvec3 index = place * (glm::dvec3(info.dims) - 1.0);
+  return {normal, glm::dot(normal, info.origin + info.index_to_world() * index)};
+}
+
+/// One opaque surface; one behind glass; two opaque ones, one of them never clipped.
+const std::vector<std::vector<SurfaceStyle>> kScenes{
+    {{0.4f, {0.8f, 0.2f, 0.1f}, 1}},
+    {{0.2f, {0.9f, 0.9f, 0.2f}, 0.3f}, {0.6f, {0.1f, 0.4f, 0.8f}, 1}},
+    {{0.7f, {0.1f, 0.4f, 0.8f}, 1},
+     {0.2f, {0.9f, 0.9f, 0.2f}, 0.3f},
+     {0.5f, {0.3f, 0.9f, 0.4f}, 1, false}}};
+
+FrameRequest lit_request(const VolumeInfo &info, const std::vector<SurfaceStyle> &surfaces) {
+  FrameRequest request{.camera = orbit_cameras(info, 1)[0], .surfaces = surfaces};
+  request.light.towards_light = glm::dvec3(0.4, -0.5, 0.8);
+  request.ambient_rays = 3;
+  request.shadow_rays = 2;
+  request.light_angle = 5;
+  return request;
+}
+
+FrameRequest without_light_rays(FrameRequest request) {
+  request.ambient_rays = request.shadow_rays = 0;
+  return request;
+}
+
+/// Pictures with and without light rays are those of the twin, and differ.
+void expect_lit_as_the_twin(Renderer &renderer, TwinRenderer &twin, const FrameRequest &request) {
+  const Appearance &appearance = request.light;
+  renderer.render(without_light_rays(request));
+  const Image8 unlit = renderer.shade(appearance);
+  twin.render(request);
+  EXPECT_FALSE(renderer.render(request).cancelled);
+  expect_same_hits(renderer.hits(), twin.hits(), size_of(request, renderer.abilities()).width);
+  EXPECT_EQ(renderer.shade(appearance).pixels, twin.shade(appearance).pixels);
+  EXPECT_NE(renderer.shade(appearance).pixels, unlit.pixels);
+}
+
+void expect_scenes_lit_as_the_twin(Renderer &renderer, const CompressedVolume &volume) {
+  const VolumeInfo &info = volume.info;
+  const std::vector<ClipPlane> planes{through(info, 0.5, {-0.3, -1, 0.2}),
+                                      through(info, 0.6, {-1, -0.1, -0.5})};
+  TwinRenderer twin(volume, kSize);
+  for (const std::vector<SurfaceStyle> &surfaces : kScenes) {
+    for (const Clip &clip : {Clip{}, Clip{planes}, Clip{planes, false}}) {
+      SCOPED_TRACE(fmt::format("{} surfaces, {} planes", surfaces.size(), clip.planes.size()));
+      FrameRequest request = lit_request(info, surfaces);
+      request.clip = clip;
+      expect_lit_as_the_twin(renderer, twin, request);
+    }
+  }
+  FrameRequest request = lit_request(info, kScenes[1]);
+  request.slices = {{{through(info, 0.4, {0.2, 1, 0.3}), 0.6f}}, -1, 1, color_map("viridis")};
+  expect_lit_as_the_twin(renderer, twin, request);
+}
+
+/// The hits of layers behind the first have light rays: what a clear surface lies before is lit as
+/// if the surface were not there.
+void expect_light_behind_glass(Renderer &renderer, const VolumeInfo &info) {
+  SurfaceStyle glass = kScenes[1][0];
+  const SurfaceStyle solid = kScenes[1][1];
+  glass.opacity = 1e-6f;
+  const Appearance appearance = lit_request(info, {}).light;
+  renderer.render(lit_request(info, {solid}));
+  const Image8 alone = renderer.shade(appearance);
+  renderer.render(without_light_rays(lit_request(info, {solid})));
+  const Image8 unlit = renderer.shade(appearance);
+  renderer.render(lit_request(info, {glass, solid}));
+  const Image8 behind = renderer.shade(appearance);
+  std::size_t num_differ = 0, num_lit = 0;
+  for (std::size_t i = 0; i < alone.pixels.size(); ++i) {
+    if (std::abs(int{alone.pixels[i]} - int{behind.pixels[i]}) > 1) ++num_differ;
+    if (std::abs(int{alone.pixels[i]} - int{unlit.pixels[i]}) > 1) ++num_lit;
+  }
+  EXPECT_EQ(num_differ, 0u);
+  EXPECT_GT(num_lit, alone.pixels.size() / 20);
+}
+
+/// Surfaces that are given as a list of one have the light of a plain frame.
+void expect_plain_light(Renderer &renderer, const VolumeInfo &info) {
+  FrameRequest request = lit_request(info, kScenes[0]);
+  request.light.surface = kScenes[0][0].color;
+  renderer.render(request);
+  const Image8 listed = renderer.shade(request.light);
+  request.surfaces.clear();
+  request.isovalue = kScenes[0][0].isovalue;
+  renderer.render(request);
+  EXPECT_EQ(renderer.shade(request.light).pixels, listed.pixels);
+}
+
+TEST(LayerLightHost, PicturesAreTheTwins) {
+  const CompressedVolume volume = gyroid();
+  HostRenderer renderer(volume, {.largest = kSize});
+  expect_scenes_lit_as_the_twin(renderer, volume);
+  expect_light_behind_glass(renderer, volume.info);
+  expect_plain_light(renderer, volume.info);
+}
+
+class LayerLightOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
+ protected:
+  DeviceRenderer renderer_of(const CompressedVolume &volume, RendererOptions options) {
+    options.max_surfaces = 4;
+    options.with_given_rays = true;
+    return {device_, volume, options};
+  }
+
+  ocl::Device device_{GetParam()};
+};
+INSTANTIATE_TEST_SUITE_P(Devices, LayerLightOnDevice, testing::ValuesIn(devices_under_test()),
+                         device_test_name);
+
+/// Small enough for Oclgrind.
+TEST_P(LayerLightOnDevice, SmallFrame) {
+  const CompressedVolume volume = gyroid({14, 13, 17}, 6);
+  DeviceRenderer renderer = renderer_of(volume, {.size = kSmall, .cache_slots = 30});
+  TwinRenderer twin(volume, kSmall);
+  expect_lit_as_the_twin(renderer, twin, lit_request(volume.info, kScenes[2]));
+}
+
+TEST_P(LayerLightOnDevice, PicturesAreTheTwins) {
+  const CompressedVolume volume = gyroid();
+  DeviceRenderer renderer = renderer_of(volume, {.size = kSize});
+  expect_scenes_lit_as_the_twin(renderer, volume);
+  expect_light_behind_glass(renderer, volume.info);
+  expect_plain_light(renderer, volume.info);
+}
+
+/// Rays wait for blocks, and pictures of all passes are looked at.
+TEST_P(LayerLightOnDevice, PassByPass) {
+  const CompressedVolume volume = gyroid();
+  DeviceRenderer renderer = renderer_of(volume, {.size = kSize, .cache_slots = 60});
+  FrameRequest request = lit_request(volume.info, kScenes[2]);
+  TwinRenderer twin(volume, kSize);
+  twin.render(request);
+  std::uint32_t num_passes = 0;
+  request.on_pass = [&](const PassStats &) {
+    ++num_passes;
+    renderer.shade(request.light);
+    return true;
+  };
+  renderer.render(request);
+  EXPECT_EQ(renderer.shade(request.light).pixels, twin.shade(request.light).pixels);
+  ASSERT_GT(num_passes, 20u);
+  for (const std::uint32_t stop : {num_passes / 4, num_passes / 2, num_passes - 5}) {
+    std::uint32_t pass = 0;
+    request.on_pass = [&](const PassStats &) { return ++pass < stop; };
+    EXPECT_TRUE(renderer.render(request).cancelled);
+    renderer.shade(request.light);
+  }
+  request.on_pass = {};
+  renderer.render(request);
+  EXPECT_EQ(renderer.shade(request.light).pixels, twin.shade(request.light).pixels);
+}
+
+}  // namespace
+}  // namespace isowave::core
