@@ -178,8 +178,9 @@ TEST_P(LayerLightOnDevice, PassByPass) {
   renderer.render(request);
   EXPECT_EQ(renderer.shade(request.light).pixels, twin.shade(request.light).pixels);
   ASSERT_GT(num_passes, 20u);
-  for (const std::uint32_t stop : {num_passes / 4, num_passes / 2, num_passes - 5}) {
+  for (const std::uint32_t stop : {num_passes / 4, num_passes / 2}) {
     std::uint32_t pass = 0;
+    renderer.clear_cache();  // as the first frame, though the number of passes varies
     request.on_pass = [&](const PassStats &) { return ++pass < stop; };
     EXPECT_TRUE(renderer.render(request).cancelled);
     renderer.shade(request.light);

@@ -57,14 +57,6 @@ void check_surfaces(const std::vector<SurfaceStyle> &surfaces, const Slices &sli
   }
 }
 
-void check_some_are_opaque(const std::vector<SurfaceStyle> &surfaces) {
-  const auto is_opaque = [](const SurfaceStyle &surface) { return surface.opacity == 1; };
-  if (std::ranges::none_of(surfaces, is_opaque))
-    throw Error(
-        "ambient and shadow rays end at surfaces of opacity 1, and there is none: give "
-        "one, or leave out these rays");
-}
-
 std::vector<std::uint32_t> innermost_first(const std::vector<SurfaceStyle> &surfaces) {
   std::vector<std::uint32_t> numbers(surfaces.size());
   std::iota(numbers.begin(), numbers.end(), 0u);

@@ -2,10 +2,12 @@
 // Several surfaces of a frame, translucent ones, and slices. Rays go on from hits on translucent
 // surfaces, and their hits are blended front to back, in layers (kernels_cl/portable/layers.h).
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <vector>
 
+#include "core/base/error.hpp"
 #include "core/frame/appearance.hpp"
 #include "core/view/clip.hpp"
 #include "kernels_cl/portable/layers.h"
@@ -39,8 +41,17 @@ struct Slices {
 ///         degenerate, or whose range of values is
 void check_surfaces(const std::vector<SurfaceStyle> &surfaces, const Slices &slices = {});
 
-/// Throws  Error: none of the surfaces is opaque, so ambient and shadow rays end nowhere
-void check_some_are_opaque(const std::vector<SurfaceStyle> &surfaces);
+/// For frames with ambient or shadow rays.
+///
+/// surfaces  with members `opacity`
+/// Throws    Error: none is opaque, so the rays end nowhere
+template <class Surfaces>
+void check_some_are_opaque(const Surfaces &surfaces) {
+  if (std::ranges::none_of(surfaces, [](const auto &surface) { return surface.opacity == 1; }))
+    throw Error(
+        "ambient and shadow rays end at surfaces of opacity 1, and there is none: give "
+        "one, or leave out these rays");
+}
 
 /// The numbers of surfaces, those of larger isovalues first: the order in which layers prefer hits
 /// at one place.
