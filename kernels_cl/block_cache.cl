@@ -329,8 +329,8 @@ kernel void cache_classify(const FrameParams frame_params, uint num_slots,
     if (slot_block_ids[slot] != ISO_INVALID_ID) {
       ulong bits = 0;
       for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v) {
-        bits |= (ulong)(cache_values[slot * ISO_BLOCK_VOXELS + v] - frame->surface.isovalue >= 0.0f)
-                << v;
+        const float value = field_of_slot(frame, cache_values[slot * ISO_BLOCK_VOXELS + v]);
+        bits |= (ulong)(value - frame->surface.isovalue >= 0.0f) << v;
       }
       inside[slot] = bits;
     }

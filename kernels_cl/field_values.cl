@@ -65,7 +65,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void field_va
         touched = field_blocks(place);
         missing = touched & ~find_slots(frame, table, base, touched, slots + item);
         if (missing == 0) {
-          const CachedStencil cached = {cache_values, slots + item, base};
+          const CachedStencil cached = {cache_values, slots + item, base, 0};
           float corners[8];
           ISO_UNROLL
           for (int c = 0; c < 8; ++c) {

@@ -13,11 +13,27 @@
 /// were made of, some value may be below the isovalue iff low < below, and some at or above iff
 /// high >= above. Both: active. e and f may be larger for blocks of larger bounds (block_bound.h).
 /// Coarse macrocells of 4^3 blocks hold the union of their blocks.
+///
+/// With ISO_LABELS a voxel's value is a bit mask of groups (portable/label_table.h). Then low is
+/// the groups that all voxels are in, high those that any voxel is in, and limits[0] is a group: a
+/// block is active if the group is in high alone.
 #include "device/block_stream.h"
 #include "portable/block_grid.h"
 
+ISO_INLINE VoxelRange no_range(void) {
+  VoxelRange r;
+  r.min = ISO_LABELS ? 255.0f : INFINITY;
+  r.max = ISO_LABELS ? 0.0f : -INFINITY;
+  return r;
+}
+
 ISO_INLINE VoxelRange join(VoxelRange a, VoxelRange b) {
   VoxelRange r;
+#if ISO_LABELS
+  r.min = (float)((uint)a.min & (uint)b.min);
+  r.max = (float)((uint)a.max | (uint)b.max);
+  return r;
+#endif
   r.min = a.min < b.min ? a.min : b.min;
   r.max = a.max > b.max ? a.max : b.max;
   return r;
@@ -47,15 +63,14 @@ kernel void macrocell_partials(const FrameParams frame_params, global const uint
     for (uint lattice = 0; lattice < 8; ++lattice) {
       const uint end_x = lattice & 1 ? 1 : size_x, end_y = lattice & 2 ? 1 : size_y,
                  end_z = lattice & 4 ? 1 : size_z;
-      VoxelRange range;
-      range.min = INFINITY;
-      range.max = -INFINITY;
+      VoxelRange range = no_range();
       for (uint z = 0; z < end_z; ++z) {
         for (uint y = 0; y < end_y; ++y) {
           for (uint x = 0; x < end_x; ++x) {
             const float value = values[x + 4 * y + 16 * z];
-            range.min = value < range.min ? value : range.min;
-            range.max = value > range.max ? value : range.max;
+            VoxelRange voxel;
+            voxel.min = voxel.max = value;
+            range = join(voxel, range); /* none of NaN */
           }
         }
       }
@@ -98,10 +113,8 @@ kernel void macrocell_ranges(const FrameParams frame_params, uint layer,
     const uint x = i % frame->grid.blocks_x, y = i / frame->grid.blocks_x;
     const int owns_cells = 4 * x + 1 < frame->grid.dims_x && 4 * y + 1 < frame->grid.dims_y &&
                            4 * layer + 1 < frame->grid.dims_z;
-    VoxelRange range;
+    VoxelRange range = no_range();
     uint low = 255, high = 0;
-    range.min = INFINITY;
-    range.max = -INFINITY;
     for (uint corner = 0; corner < 8; ++corner) {
       const uint nx = x + (corner & 1), ny = y + (corner >> 1 & 1);
       if (nx >= frame->grid.blocks_x || ny >= frame->grid.blocks_y ||
@@ -110,7 +123,10 @@ kernel void macrocell_ranges(const FrameParams frame_params, uint layer,
       const uint partial = 8 * (nx + frame->grid.blocks_x * ny) + corner;
       range = join(range, (corner & 4 ? above : below)[partial]);
     }
-    if (owns_cells) {
+    if (owns_cells && ISO_LABELS) {
+      low = (uint)range.min;
+      high = (uint)range.max;
+    } else if (owns_cells) {
       /* Bisection: thresholds[low] <= min < thresholds[low + 1], and the first threshold >= max. */
       uint end = 255;
       low = 0;
@@ -156,15 +172,17 @@ kernel void macrocell_coarse_ranges(const FrameParams frame_params, uint num_coa
     for (uint bit = 0; bit < 64; ++bit) {
       const uint block_id = macrocell_block(frame, coarse, bit);
       if (block_id == ISO_INVALID_ID) continue;
-      low = min(low, (uint)ranges[frame->place.ranges_begin + block_id] & 255u);
-      high = max(high, (uint)ranges[frame->place.ranges_begin + block_id] >> 8);
+      const uint range = ranges[frame->place.ranges_begin + block_id];
+      low = ISO_LABELS ? low & range : min(low, range & 255u);
+      high = ISO_LABELS ? high | range >> 8 : max(high, range >> 8);
     }
     coarse_ranges[coarse] = (ushort)(low | high << 8);
   }
 }
 
-/// limits: `below` in bits 0..15, `above` in bits 16..31.
+/// limits: `below` in bits 0..15, `above` in bits 16..31; of labels, a group.
 ISO_INLINE int holds_isovalue(uint range, uint limits) {
+  if (ISO_LABELS) return (int)((range >> 8 & ~range) >> limits & 1u);
   return (range & 255u) < (limits & 0xFFFFu) && range >> 8 >= limits >> 16;
 }
 

@@ -123,7 +123,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void smooth_n
       touched = stencil_blocks(&stencil);
       missing = touched & ~find_slots(level, table, base, touched, slots + item);
       if (missing == 0) {
-        const CachedStencil cached = {cache_values, slots + item, base};
+        const CachedStencil cached = {cache_values, slots + item, base,
+                                      hits[pixel].cell >> ISO_SURFACE_BIT};
         write_gradient(&hits[pixel], &cached, &stencil);
         stamp_stencil(slot_stamps, read_stamp(pass), b, &cached);
       } else {

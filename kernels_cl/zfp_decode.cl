@@ -56,8 +56,10 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void zfp_deco
                    begin + item - first, values);
       ISO_UNROLL
       for (uint v = 32; v-- > 0;) {
-        outside_low = outside_low << 1 | is_outside(values[v] - isovalue);
-        outside_high = outside_high << 1 | is_outside(values[v + 32] - isovalue);
+        outside_low =
+            outside_low << 1 | is_outside(field_of_slot(&frame_params, values[v]) - isovalue);
+        outside_high =
+            outside_high << 1 | is_outside(field_of_slot(&frame_params, values[v + 32]) - isovalue);
       }
       inside[slots[request]] = ~((ulong)outside_high << 32 | outside_low);
     }

@@ -142,6 +142,11 @@ void check_macrocells(ocl::Device &device) {
     ocl::BufferSizes with_own = MacrocellBuffers::sizes({limits.num_blocks, limits.num_macrocells});
     expect_books(device, with_own.add(Macrocells::sizes(limits.num_macrocells, 1)),
                  [&] { return Macrocells(device, grid, stream); });
+    const DeviceStream of_labels(device, volume, 0, ByteTable::kGroups);
+    expect_books(device,
+                 Macrocells::sizes(limits.num_macrocells, 3,
+                                   std::uint64_t{grid.grid.blocks_x} * grid.grid.blocks_y),
+                 [&] { return Macrocells(device, grid, of_labels, buffers); });
   }
 }
 
@@ -149,16 +154,16 @@ void check_device_stream(ocl::Device &device) {
   for (const bool indexed : {false, true}) {
     const CompressedVolume volume = small_volume(indexed);
     const std::uint64_t bytes = volume.word_count() * sizeof(uint);
-    for (const bool with_bounds : {false, true}) {
+    for (const ByteTable table : {ByteTable::kNone, ByteTable::kBounds, ByteTable::kGroups}) {
       for (const std::uint64_t largest : {bytes, bytes / 2}) {
         const StreamSplit split = split_stream(volume, largest);
         ASSERT_EQ(split.num_parts > 1, largest < bytes);
-        expect_books(device, DeviceStream::sizes(volume, split, with_bounds),
-                     [&] { return DeviceStream(device, volume, largest, with_bounds); });
+        expect_books(device, DeviceStream::sizes(volume, split, table),
+                     [&] { return DeviceStream(device, volume, largest, table); });
       }
       const OnHost host{11};
-      expect_books(device, DeviceStream::sizes(volume, host, with_bounds),
-                   [&] { return DeviceStream(device, volume, host, with_bounds); });
+      expect_books(device, DeviceStream::sizes(volume, host, table),
+                   [&] { return DeviceStream(device, volume, host, table); });
     }
   }
 }

@@ -236,7 +236,7 @@ TEST_P(MacrocellsOnDevice, SmallBlocksMovedByTheirBounds) {
   volume.bounds.exponent = -6;
   for (std::size_t i = 0; i < volume.block_count(); ++i)
     volume.bounds.codes.push_back(i % 5 == 0 ? 32 : i % 16);  // 0.5, and up to 0.23
-  DeviceStream stream(device_, volume, 0, true);
+  DeviceStream stream(device_, volume, 0, ByteTable::kBounds);
   Macrocells macrocells(device_, params, stream);
   const std::vector<float> decoded = decode_with_libzfp(volume);
   std::size_t num_selected = 0, num_in_range = 0, num_if_all_alike = 0;

@@ -49,8 +49,9 @@ DeviceStream make_stream(ocl::Device &device, const CompressedVolume &volume,
   const std::uint64_t budget = options.memory_budget, own = own_sizes(volume, options).bytes(),
                       scratch = Macrocells::setup_scratch_bytes(volume.num_blocks());
   const StreamSplit split = split_stream(volume, device.capabilities().largest_allocation);
-  const std::uint64_t whole = DeviceStream::sizes(volume, split, false).bytes(),
-                      window = DeviceStream::sizes(volume, window_for(volume), false).bytes();
+  const std::uint64_t whole = DeviceStream::sizes(volume, split, ByteTable::kNone).bytes(),
+                      window =
+                          DeviceStream::sizes(volume, window_for(volume), ByteTable::kNone).bytes();
   const bool fits = split.num_parts != 0 && whole + own + scratch <= budget / 4 * 3;
   const bool on_device =
       options.stream == StreamPlace::kDevice ||
@@ -68,9 +69,10 @@ DeviceStream make_stream(ocl::Device &device, const CompressedVolume &volume,
 
 std::uint64_t stream_bytes(const CompressedVolume &volume, const DeviceStream &stream,
                            const ocl::Device &device) {
-  if (stream.window) return DeviceStream::sizes(volume, window_for(volume), false).bytes();
+  if (stream.window)
+    return DeviceStream::sizes(volume, window_for(volume), ByteTable::kNone).bytes();
   return DeviceStream::sizes(volume, split_stream(volume, device.capabilities().largest_allocation),
-                             false)
+                             ByteTable::kNone)
       .bytes();
 }
 

@@ -16,12 +16,17 @@ void check_choices(const FrameRequest &request) {
   if (!request.clip.planes.empty() && request.bound != FieldBound::kNone)
     throw Error("a bound of the field is drawn whole: leave out clip");
   if (!request.surfaces.empty()) {
-    const bool has_slices = !request.slices.planes.empty();
+    const bool has_slices = !request.slices.planes.empty(),
+               has_labels = !request.surfaces.front().labels.empty();
     const auto leave_out = [&](bool is_given, const char *what) {
       if (is_given)
         throw Error("{0} are drawn without {1}: leave out {1}",
-                    has_slices ? "slices" : "several or translucent surfaces", what);
+                    has_labels   ? "labels"
+                    : has_slices ? "slices"
+                                 : "several or translucent surfaces",
+                    what);
     };
+    leave_out(has_labels && request.voxel_error != 0, "voxel_error");
     leave_out(request.bound != FieldBound::kNone, "bound");
     leave_out(request.voxel_pixels != 0, "voxel_pixels");
     leave_out(request.field_values, "colours by a field");
@@ -104,6 +109,11 @@ void check(const FrameRequest &request, const Abilities &abilities) {
                                         "renderer that was made with_surfaces")
                           : fmt::format("this renderer was made for {} surfaces, and {} are given",
                                         abilities.most_surfaces, request.surfaces.size()));
+  const bool has_labels = !request.surfaces.empty() && !request.surfaces.front().labels.empty();
+  need(has_labels, abilities.labels,
+       "this renderer draws no labels: draw on a device by a renderer that was made with_labels");
+  need(abilities.labels && !has_labels, false,
+       "this renderer draws labels alone: give each surface labels");
   need(request.voxel_pixels > 0, abilities.levels,
        "this renderer draws the finest level of detail alone: leave out voxel_pixels, or draw a "
        "volume with levels on the host, or on a device by a renderer that was made with_levels");

@@ -37,6 +37,7 @@ struct Abilities {
   bool clipping = false;           ///< FrameRequest::clip
   bool field = false;              ///< FrameRequest::field_values
   std::size_t most_surfaces = 0;   ///< of FrameRequest::surfaces
+  bool labels = false;             ///< surfaces of labels, and no others
   Solver solver = kDefaultSolver;  ///< the root finder
 };
 

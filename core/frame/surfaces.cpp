@@ -40,6 +40,8 @@ void check_surfaces(const std::vector<SurfaceStyle> &surfaces, const Slices &sli
   if (!slices.planes.empty()) {
     check_slices(slices);
     if (surfaces.empty()) throw Error("slices are drawn beside surfaces: give a surface");
+    if (!surfaces.front().labels.empty())
+      throw Error("labels are drawn without slices: leave out slices");
     if (surfaces.size() + slices.planes.size() > ISO_MAX_SURFACES)
       throw Error("{} surfaces and {} slices are more than a frame can have: give at most {}",
                   surfaces.size(), slices.planes.size(), ISO_MAX_SURFACES);
@@ -51,6 +53,9 @@ void check_surfaces(const std::vector<SurfaceStyle> &surfaces, const Slices &sli
       if (!(surface.color[channel] >= 0 && surface.color[channel] <= 1))
         throw Error("a colour of {} is out of range: give 0 to 1", surface.color[channel]);
     }
+    if (surface.labels.empty() != surfaces.front().labels.empty())
+      throw Error("surfaces of labels are drawn without isosurfaces: give each surface labels");
+    if (!surface.labels.empty()) continue;
     const auto same = [&](const SurfaceStyle &other) { return other.isovalue == surface.isovalue; };
     if (std::ranges::count_if(surfaces, same) > 1)
       throw Error("two surfaces have the isovalue {}: give each once", surface.isovalue);
@@ -60,8 +65,9 @@ void check_surfaces(const std::vector<SurfaceStyle> &surfaces, const Slices &sli
 std::vector<std::uint32_t> innermost_first(const std::vector<SurfaceStyle> &surfaces) {
   std::vector<std::uint32_t> numbers(surfaces.size());
   std::iota(numbers.begin(), numbers.end(), 0u);
-  std::ranges::stable_sort(numbers, std::greater<>(),
-                           [&](std::uint32_t number) { return surfaces[number].isovalue; });
+  std::ranges::stable_sort(numbers, std::greater<>(), [&](std::uint32_t number) {
+    return surfaces[number].isovalue_of_field();
+  });
   return numbers;
 }
 

@@ -10,16 +10,23 @@
 #include "core/base/error.hpp"
 #include "core/frame/appearance.hpp"
 #include "core/view/clip.hpp"
+#include "kernels_cl/portable/label_table.h"
 #include "kernels_cl/portable/layers.h"
 
 namespace isowave::core {
 
-/// An isosurface of a frame.
+/// An isosurface of a frame, or the surface of a group of labels.
 struct SurfaceStyle {
   float isovalue = 0;
   glm::vec3 color{219 / 255.0f, 189 / 255.0f, 135 / 255.0f};  ///< display values, [0,1]
   float opacity = 1;    ///< of each crossing, (0,1]; 1: nothing behind it is seen
   bool clipped = true;  ///< false: clipping planes leave it whole
+  /// The labels of the group, of a renderer of labels: the surface is that of their indicator, and
+  /// `isovalue` is not used. Empty: an isosurface.
+  std::vector<std::uint16_t> labels{};
+
+  /// The isovalue in the field that is drawn.
+  float isovalue_of_field() const { return labels.empty() ? isovalue : ISO_LABEL_ISOVALUE; }
 };
 
 /// A plane that shows the voxels, by their values, without light.
@@ -37,8 +44,8 @@ struct Slices {
 };
 
 /// Throws  Error: more than ISO_MAX_SURFACES with the slices; two at one isovalue; an isovalue that
-///         is NaN; colours or opacities out of range; slices without a surface, whose plane is
-///         degenerate, or whose range of values is
+///         is NaN; labels beside isovalues or slices; colours or opacities out of range; slices
+///         without a surface, whose plane is degenerate, or whose range of values is
 void check_surfaces(const std::vector<SurfaceStyle> &surfaces, const Slices &slices = {});
 
 /// For frames with ambient or shadow rays.
@@ -54,7 +61,7 @@ void check_some_are_opaque(const Surfaces &surfaces) {
 }
 
 /// The numbers of surfaces, those of larger isovalues first: the order in which layers prefer hits
-/// at one place.
+/// at one place. Surfaces of labels keep the order in which they are given.
 std::vector<std::uint32_t> innermost_first(const std::vector<SurfaceStyle> &surfaces);
 
 /// finest, view, camera  as make_clip_params()

@@ -70,7 +70,8 @@ std::optional<std::string> Resident::obstacle(const ocl::Device &device,
   const std::uint64_t values = buffers["decoded volume"].bytes();
   buffers.add(MacrocellBuffers::sizes({blocks, macrocells}))
       .add(Macrocells::sizes(macrocells, 1))
-      .add(DeviceStream::sizes(volume, split_stream(volume, can.largest_allocation), false));
+      .add(DeviceStream::sizes(volume, split_stream(volume, can.largest_allocation),
+                               ByteTable::kNone));
   const std::uint64_t all = buffers.bytes() + Macrocells::setup_scratch_bytes(volume.num_blocks());
   if (values > can.largest_allocation) {
     return fmt::format("the decoded volume is {} bytes, the device's largest allocation {}", values,

@@ -48,11 +48,13 @@ std::vector<Level> make_levels(ocl::Device &device, const CompressedVolume &volu
   // Bounds need the range of values (value_offset()), which a file may get wrong.
   const bool checks_range = options.with_bounds && volume.errors_are_stated;
   std::array<float, 2> extremes{};
+  const ByteTable bytes = options.with_labels   ? ByteTable::kGroups
+                          : options.with_bounds ? ByteTable::kBounds
+                                                : ByteTable::kNone;
   for (std::size_t i = 0; i < volumes.size(); ++i) {
-    streams.push_back(
-        plan.stream == StreamPlace::kHost
-            ? DeviceStream(device, *volumes[i], OnHost{plan.window_blocks}, options.with_bounds)
-            : DeviceStream(device, *volumes[i], options.largest_stream_part, options.with_bounds));
+    streams.push_back(plan.stream == StreamPlace::kHost
+                          ? DeviceStream(device, *volumes[i], OnHost{plan.window_blocks}, bytes)
+                          : DeviceStream(device, *volumes[i], options.largest_stream_part, bytes));
     macrocells.emplace_back(device, grids[i], streams.back(), buffers,
                             i == 0 ? options.range_thresholds : std::vector<float>(),
                             i == 0 && checks_range ? &extremes : nullptr);
@@ -107,7 +109,7 @@ void BlockStore::open(Wavefront &rays, std::vector<FrameParams> frames,
                       const std::vector<DecodedValues> &values, FieldBound bound,
                       RaySource source) {
   grow(rays);
-  const float isovalue = frames.front().surface.isovalue;
+  const Surface surface = frames.front().surface;
   levels[0].macrocells.use(static_cast<std::size_t>(bound));
   decode_as(values);
   const auto first = std::ranges::find_if(frames, draws);
@@ -129,7 +131,7 @@ void BlockStore::open(Wavefront &rays, std::vector<FrameParams> frames,
   rays.frame = level_frames->front();
   rays.num_level_frames = static_cast<std::uint32_t>(level_frames->size());
   if (levels.size() > 1) rays.level_frames.write_async(*level_frames);
-  classify(rays, isovalue);
+  classify(rays, surface);
 }
 
 /// Finds the active blocks of a level's frame.
@@ -142,24 +144,33 @@ void BlockStore::select(Level &level, FrameParams &frame, bool has_box) {
   if (has_box) frame.screen = make_screen_box(frame);
 }
 
-void BlockStore::classify(Wavefront &rays, float isovalue) {
-  if (cached_isovalue_.value_or(isovalue) != isovalue) {
+void BlockStore::classify(Wavefront &rays, const Surface &surface) {
+  const bool has_groups = levels[0].stream.has_groups();
+  const std::pair of(surface.isovalue, has_groups ? surface.isovalue_index : 0);
+  if (cached_surface_.value_or(of) != of) {
     const auto stage = device.timer().stage("macrocells");
     cache.classify(rays);
   }
-  cached_isovalue_ = isovalue;
+  cached_surface_ = of;
 }
 
-void BlockStore::show_surface(Wavefront &rays, std::size_t selection, float isovalue) {
+void BlockStore::set_groups(std::span<const std::uint8_t> table) {
+  levels[0].stream.set_groups(table);
+  levels[0].macrocells.choose_labels(make_grid_params(levels[0].info), levels[0].stream);
+  clear();
+}
+
+void BlockStore::show_surface(Wavefront &rays, std::size_t selection, float isovalue, uint group) {
   Level &level = levels[drawing.first];
   level.macrocells.use(selection);
   FrameParams frame = level.frame;
   frame.surface.isovalue = isovalue;
+  frame.surface.isovalue_index = group;
   select(level, frame, !rays.is_clipped());
   level.frame = rays.frame = frame;
   level_frames->assign(1, frame);
   if (levels.size() > 1) rays.level_frames.write_async(*level_frames);
-  classify(rays, isovalue);
+  classify(rays, frame.surface);
 }
 
 /// Has blocks decoded to these values, and forgets those of others.
@@ -248,7 +259,7 @@ void BlockStore::grow(Wavefront &rays) {
 
 void BlockStore::clear() {
   cache.clear();
-  cached_isovalue_.reset();
+  cached_surface_.reset();
 }
 
 void BlockStore::resize(const BlockCache::Limits &limits, Wavefront &rays) {
@@ -257,7 +268,7 @@ void BlockStore::resize(const BlockCache::Limits &limits, Wavefront &rays) {
   if (on_resize) on_resize(limits.num_slots);
   rays.reset_counts();
   slots_are_scarce_ = true;
-  cached_isovalue_.reset();
+  cached_surface_.reset();
   forget_requests();
   if (on_reset) on_reset();
 }

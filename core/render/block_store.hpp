@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -78,8 +79,16 @@ class BlockStore {
   /// Goes on with another surface of the frame at work, which one level of detail draws.
   ///
   /// selection  its selection of active blocks (MacrocellBuffers), 0: that of open()
+  /// group      of labels, its group
   /// Waits      at the first call for an isovalue
-  void show_surface(Wavefront &rays, std::size_t selection, float isovalue);
+  void show_surface(Wavefront &rays, std::size_t selection, float isovalue, uint group);
+
+  /// Puts labels into groups, between frames: makes the ranges of blocks anew, and empties the
+  /// cache.
+  ///
+  /// table  [ISO_NUM_LABELS], see label_table()
+  /// Waits  yes
+  void set_groups(std::span<const std::uint8_t> table);
 
   /// Begins a pass: gives slots and values to the blocks that the pass before requested.
   ///
@@ -141,15 +150,16 @@ class BlockStore {
  private:
   void grow(Wavefront &rays);
   void select(Level &level, FrameParams &frame, bool has_box);
-  void classify(Wavefront &rays, float isovalue);
+  void classify(Wavefront &rays, const Surface &surface);
   void decode_as(const std::vector<DecodedValues> &values);
 
-  std::uint32_t wanted_slots_ = 0;        ///< slots from the next frame on
-  bool is_small_ = false;                 ///< slots may run out within one pass
-  bool slots_are_scarce_ = true;          ///< free slots may not suffice for the next passes
-  Schedule schedule_{};                   ///< every frame's, except table_groups
-  std::optional<LevelRange> asked_;       ///< levels whose blocks the last pass may have asked for
-  std::optional<float> cached_isovalue_;  ///< isovalue of the cache's bits of voxels inside
+  std::uint32_t wanted_slots_ = 0;   ///< slots from the next frame on
+  bool is_small_ = false;            ///< slots may run out within one pass
+  bool slots_are_scarce_ = true;     ///< free slots may not suffice for the next passes
+  Schedule schedule_{};              ///< every frame's, except table_groups
+  std::optional<LevelRange> asked_;  ///< levels whose blocks the last pass may have asked for
+  /// Isovalue and group of the cache's bits of voxels inside.
+  std::optional<std::pair<float, uint>> cached_surface_;
 };
 
 }  // namespace isowave::core

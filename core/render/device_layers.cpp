@@ -30,7 +30,8 @@ void DeviceRenderer::draw_layers(const FrameRequest &request, Frame &frame) {
   const std::vector<std::uint32_t> order = innermost_first(request.surfaces);
   std::vector<float> isovalues;
   isovalues.reserve(order.size());
-  for (const std::uint32_t surface : order) isovalues.push_back(request.surfaces[surface].isovalue);
+  for (const std::uint32_t surface : order)
+    isovalues.push_back(request.surfaces[surface].isovalue_of_field());
   FrameStats &stats = frame.stats;
   frame.waves_left = std::numeric_limits<std::uint32_t>::max();  // as many as it takes
   last_view_.reset();
@@ -78,8 +79,9 @@ void DeviceRenderer::set_colors(std::span<const RayColor> colors) {
 /// Goes on with the surface at that place. clip: that of the frame.
 void DeviceRenderer::show_surface(const FrameRequest &request, const ClipParams &clip,
                                   std::size_t place, float isovalue) {
-  rays_.set_clip(request.surfaces[layers_->surface_at(place)].clipped ? clip : ClipParams{});
-  blocks_.show_surface(rays_, place, isovalue);
+  const std::uint32_t number = layers_->surface_at(place);
+  rays_.set_clip(request.surfaces[number].clipped ? clip : ClipParams{});
+  blocks_.show_surface(rays_, place, isovalue, number);
 }
 
 /// Returns the number of surfaces that have hits: all, unless the frame is stopped.

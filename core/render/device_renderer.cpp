@@ -248,6 +248,7 @@ Abilities DeviceRenderer::abilities_of(const RendererOptions &options) {
   abilities.field = options.field != nullptr;
   abilities.bounds = options.with_bounds;
   abilities.most_surfaces = options.max_surfaces;
+  abilities.labels = options.with_labels;
   abilities.given_rays = options.with_given_rays;
   abilities.kept_picture = options.with_kept_picture;
   abilities.solver = options.solver;
@@ -271,11 +272,17 @@ void DeviceRenderer::begin_frame(const FrameRequest &request) {
   if (light_rays_of(request).count() != 0 && is_brick())
     throw Error("a brick's ambient and shadow rays go on in other bricks: see TeamRenderer");
   const ImageSize size = size_of(request, abilities());
-  const SurfaceStyle first = request.surfaces.empty()
-                                 ? SurfaceStyle{.isovalue = request.isovalue}
-                                 : request.surfaces[innermost_first(request.surfaces)[0]];
-  std::vector<FrameParams> frames = make_level_frames(infos_of(blocks_.levels), request.camera,
-                                                      size, first.isovalue, request.voxel_pixels);
+  const std::uint32_t number =
+      request.surfaces.empty() ? 0 : innermost_first(request.surfaces).front();
+  const SurfaceStyle first = request.surfaces.empty() ? SurfaceStyle{.isovalue = request.isovalue}
+                                                      : request.surfaces[number];
+  std::vector<FrameParams> frames =
+      make_level_frames(infos_of(blocks_.levels), request.camera, size, first.isovalue_of_field(),
+                        request.voxel_pixels);
+  if (options_.with_labels) {
+    choose_labels(request.surfaces);
+    frames.front().surface.isovalue_index = number;
+  }
   const std::vector<DecodedValues> values = decoded_values(request);
   has_picture_ = false;
   has_layers_ = is_in_further_layer_ = false;
@@ -288,6 +295,16 @@ void DeviceRenderer::begin_frame(const FrameRequest &request) {
   open_frame(std::move(frames), values, request.bound, RaySource::kCamera);
   has_field_values_ = request.field_values;
   if (field_) field_->begin_frame(has_field_values_, request.field_on_caps);
+}
+
+/// Puts labels into the groups of surfaces. Costs time if they are not those of the last frame.
+void DeviceRenderer::choose_labels(const std::vector<SurfaceStyle> &surfaces) {
+  LabelTable table = label_table(surfaces);
+  if (table == label_table_) return;
+  passes_.drain();
+  label_table_.clear();  // until the blocks are there
+  blocks_.set_groups(table);
+  label_table_ = std::move(table);
 }
 
 void DeviceRenderer::open_frame(std::vector<FrameParams> frames,
@@ -335,6 +352,11 @@ std::vector<DecodedValues> DeviceRenderer::decoded_values(const FrameRequest &re
 std::optional<BlockBox> DeviceRenderer::surface_box(std::span<const float> isovalues) {
   Level &finest = blocks_.levels[0];
   finest.macrocells.use(static_cast<std::size_t>(FieldBound::kNone));
+  if (options_.with_labels) {
+    choose_labels({{.labels = labels_of(isovalues)}});
+    return isowave::core::surface_box(finest.macrocells, finest.info,
+                                      std::array{ISO_LABEL_ISOVALUE});
+  }
   return isowave::core::surface_box(finest.macrocells, finest.info, isovalues);
 }
 

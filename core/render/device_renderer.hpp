@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/frame/labels.hpp"
 #include "core/frame/renderer.hpp"
 #include "core/render/block_store.hpp"
 #include "core/render/field_wave.hpp"
@@ -58,8 +59,9 @@ class DeviceRenderer : public Renderer {
 
   /// The box around the blocks that isosurfaces may be in; none if they are in no block.
   ///
-  /// Throws  Error: an isovalue is NaN
-  /// Waits   yes
+  /// isovalues  of a renderer of labels: labels, of whose surface the blocks are
+  /// Throws     Error: an isovalue is NaN, or no label
+  /// Waits      yes
   std::optional<BlockBox> surface_box(std::span<const float> isovalues);
 
   Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {},
@@ -164,6 +166,7 @@ class DeviceRenderer : public Renderer {
   PassStats stats_of(const PassCounts &counts, BlockStore &blocks);
   void cast_round(std::uint32_t round, Frame &frame);
   void draw_surface(const FrameRequest &request, Frame &frame);
+  void choose_labels(const std::vector<SurfaceStyle> &surfaces);
   void draw_layers(const FrameRequest &request, Frame &frame);
   void show_surface(const FrameRequest &request, const ClipParams &clip, std::size_t place,
                     float isovalue);
@@ -211,8 +214,9 @@ class DeviceRenderer : public Renderer {
   bool has_layers_ = false;                                 ///< the frame at work, or the last one
   std::optional<std::size_t> finds_first_of_;   ///< the surface whose first hits are in rays_.hits
   std::optional<std::size_t> finds_behind_of_;  ///< the surface whose next hits are there
-  bool is_in_further_layer_ = false;            ///< whether the hits of a further layer are there
-  std::optional<RaysWave> given_rays_;          ///< this and the next two: options_.with_given_rays
+  LabelTable label_table_;  ///< of the last frame; empty: none yet, or a renderer without labels
+  bool is_in_further_layer_ = false;    ///< whether the hits of a further layer are there
+  std::optional<RaysWave> given_rays_;  ///< this and the next two: options_.with_given_rays
   std::optional<Ambient> ambient_;
   std::optional<AmbientRound> ambient_round_;
   std::optional<FieldWave> field_;  ///< options_.field

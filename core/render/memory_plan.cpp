@@ -57,7 +57,7 @@ std::uint32_t window_blocks_for(const CompressedVolume &volume, const MemoryRequ
 ocl::BufferSizes stream_sizes(const MemoryPlan &plan, const CompressedVolume &volume,
                               const MemoryRequest &request) {
   if (plan.stream == StreamPlace::kHost)
-    return DeviceStream::sizes(volume, OnHost{plan.window_blocks}, request.with_bounds);
+    return DeviceStream::sizes(volume, OnHost{plan.window_blocks}, request.bytes());
   const std::uint64_t largest = request.largest_stream_part != 0
                                     ? request.largest_stream_part
                                     : std::numeric_limits<std::uint64_t>::max();
@@ -67,17 +67,19 @@ ocl::BufferSizes stream_sizes(const MemoryPlan &plan, const CompressedVolume &vo
         "the compressed volume of {} bytes does not fit {} buffers of {}: leave it on the host",
         volume.word_count() * sizeof(uint), kMaxStreamParts, largest);
   }
-  return DeviceStream::sizes(volume, split, request.with_bounds);
+  return DeviceStream::sizes(volume, split, request.bytes());
 }
 
 /// Adds the buffers of the volume, or of one of its levels of detail.
 void add_level(MemoryPlan &plan, const CompressedVolume &volume, const MemoryRequest &request) {
   const ocl::BufferSizes stream = stream_sizes(plan, volume, request);
   plan.stream_bytes += stream.bytes();
-  plan.buffers.add(stream).add(Macrocells::sizes(num_macrocells(make_grid(volume.info)),
-                                                 plan.limits.macrocells.num_selections));
-  plan.setup_bytes = std::max(plan.setup_bytes,
-                              plan.total() + Macrocells::setup_scratch_bytes(volume.num_blocks()));
+  const glm::uvec3 blocks = volume.num_blocks();
+  plan.buffers.add(stream).add(Macrocells::sizes(
+      num_macrocells(make_grid(volume.info)), plan.limits.macrocells.num_selections,
+      request.with_labels ? std::uint64_t{blocks.x} * blocks.y : 0));
+  plan.setup_bytes =
+      std::max(plan.setup_bytes, plan.total() + Macrocells::setup_scratch_bytes(blocks));
 }
 
 RendererLimits limits_of(const CompressedVolume &volume, const MemoryRequest &request,
@@ -98,7 +100,9 @@ RendererLimits limits_of(const CompressedVolume &volume, const MemoryRequest &re
                .with_field = request.with_field || request.max_surfaces != 0},
       .cache = BlockCache::limits_for(
           make_id_grid(grids), cache_slots, rays, request.sparse_table ? 4 : 2,
-          slot_type_for(levels_of(volume, request.with_levels), request.with_bounds)),
+          request.with_labels
+              ? SlotType::kGroups
+              : slot_type_for(levels_of(volume, request.with_levels), request.with_bounds)),
       .wave = {.num_rays = rays, .num_slots = cache_slots, .group_size = request.group_size},
       .kept_rays = request.kept_rays,
       .layers = {.num_rays = rays, .max_surfaces = request.max_surfaces}};
@@ -176,7 +180,7 @@ FieldPlan plan_field(const CompressedVolume &field, const MemoryRequest &request
     const MacrocellBuffers::Limits macrocells{.num_blocks = block_count(grid),
                                               .num_macrocells = num_macrocells(grid)};
     MemoryRequest of_field = request;
-    of_field.with_bounds = false;
+    of_field.with_bounds = of_field.with_labels = false;
     plan.bytes = stream_sizes(stream, field, of_field).bytes() +
                  MacrocellBuffers::sizes(macrocells).bytes() +
                  Macrocells::sizes(macrocells.num_macrocells, 1).bytes() +

@@ -44,6 +44,11 @@ struct MemoryRequest {
   std::uint32_t max_surfaces = 0;   ///< of frames with layers
   bool sparse_table = false;        ///< the cache's table has room, so that rays look up faster
   bool with_field = false;          ///< hits have values of a field
+  bool with_labels = false;         ///< voxels are labels
+
+  ByteTable bytes() const {
+    return with_labels ? ByteTable::kGroups : with_bounds ? ByteTable::kBounds : ByteTable::kNone;
+  }
 };
 
 /// Limits that the lengths of a renderer's buffers depend on, beside its compressed volume. The

@@ -4,6 +4,7 @@
 #include <bit>
 
 #include "core/base/error.hpp"
+#include "core/frame/labels.hpp"
 #include "core/stages/kept_picture.hpp"
 #include "core/view/detail.hpp"
 
@@ -51,6 +52,19 @@ RendererOptions checked(RendererOptions options, const CompressedVolume &volume,
     throw Error(
         "several and translucent surfaces are drawn by pipeline rays and solver bernstein: "
         "leave out with_surfaces");
+  if (options.with_labels) {
+    check_labels(volume);
+    const auto leave_out = [](bool is_given, const char *what) {
+      if (is_given) throw Error("labels are drawn without {0}: leave out {0}", what);
+    };
+    leave_out(options.with_levels, "with_levels");
+    leave_out(options.with_bounds, "with_bounds");
+    leave_out(options.with_kept_picture, "with_time_budget");
+    leave_out(options.with_given_rays, "with_rays");
+    leave_out(options.field != nullptr, "a field");
+    if (options.max_surfaces == 0)
+      throw Error("labels are drawn as surfaces: give with_surfaces, 1 to {}", ISO_MAX_SURFACES);
+  }
   if (options.field != nullptr) {
     check_volume_info(options.field->info, "the field");
     if (volume.info.brick != BrickOf{} || options.field->info.brick != BrickOf{})
@@ -111,7 +125,8 @@ MemoryPlan make_plan(const ocl::Device &device, const CompressedVolume &volume,
                               options.with_given_rays,
                               options.max_surfaces,
                               options.memory_budget == 0 && options.cache_slots == 0,
-                              options.field != nullptr};
+                              options.field != nullptr,
+                              options.with_labels};
   std::uint64_t budget = options.memory_budget != 0 ? options.memory_budget
                                                     : device.capabilities().global_memory / 4 * 3;
   if (options.field != nullptr) {

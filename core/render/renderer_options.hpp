@@ -38,6 +38,7 @@ struct RendererOptions {
   bool with_bounds = false;        ///< frames may draw bounds of the volume
   bool with_kept_picture = false;  ///< DeviceRenderer::keep_picture() will be called
   std::uint32_t max_surfaces = 0;  ///< most FrameRequest::surfaces of a frame
+  bool with_labels = false;        ///< frames have surfaces of labels alone; needs max_surfaces
   /// A second volume for FrameRequest::field_values; null: none. Must outlive the renderer.
   const CompressedVolume *field = nullptr;
   std::uint32_t field_slots = 0;  ///< of its cache, at least 8; 0: as many as frames need

@@ -38,11 +38,13 @@ MacrocellBuffers::MacrocellBuffers(ocl::Device &device, const Limits &limits)
   if (limits.no_data_words != 0) no_data.emplace(device, sizes(limits)["voxels without data"]);
 }
 
-ocl::BufferSizes Macrocells::sizes(std::uint64_t num_macrocells, std::size_t num_selections) {
+ocl::BufferSizes Macrocells::sizes(std::uint64_t num_macrocells, std::size_t num_selections,
+                                   std::uint64_t label_blocks) {
   ocl::BufferSizes sizes{ocl::buffer_size<ushort>("macrocell ranges", num_macrocells),
                          ocl::buffer_size<uint>("active limits", ISO_BOUND_CODES)};
   for (std::size_t i = 0; i < num_selections; ++i)
     sizes.add({ocl::buffer_size<int>("active box", 6)});
+  if (label_blocks != 0) sizes.add(layer_sizes(label_blocks));
   return sizes;
 }
 
@@ -61,7 +63,13 @@ Macrocells::Macrocells(ocl::Device &device, const FrameParams &frame, const Devi
       masks_kernel_(device, stream.defines()) {
   for (const ocl::BufferSize &size : own_sizes().named("active box"))
     selections_.push_back({.box = ocl::Buffer<int>(device, size)});
-  build(device, frame, stream, extremes);
+  if (!stream.has_groups()) {
+    build(device, frame, stream, extremes);
+    return;
+  }
+  of_labels_ = std::make_unique<OfLabels>(device, stream.defines(),
+                                          std::uint64_t{frame.grid.blocks_x} * frame.grid.blocks_y);
+  compile(device, stream, of_labels_->kernels, false);
 }
 
 /// Launches every kernel without a block to work on.
@@ -96,35 +104,44 @@ void Macrocells::build(ocl::Device &device, const FrameParams &frame, const Devi
     thresholds_ =
         sample_thresholds(device, static_cast<std::uint32_t>(block_count(frame.grid)), decode);
   }
-
-  const std::uint32_t layer_blocks = frame.grid.blocks_x * frame.grid.blocks_y;
-  const ocl::BufferSizes scratch = layer_sizes(layer_blocks);
-  ocl::Buffer<float> thresholds(device, scratch["range thresholds"]);
-  thresholds.write(thresholds_);
-  ocl::Buffer<VoxelRange> below(device, scratch["range partials, layer below"]);
-  ocl::Buffer<VoxelRange> above(device, scratch["range partials, layer above"]);
-  const ocl::Range layer_range = ocl::Range::strided(layer_blocks, ocl::kGroupSize, device);
-  constexpr std::uint32_t kBlocksPerItem = 64;
-  const ocl::Range few_items = ocl::Range::strided(
-      (layer_blocks + kBlocksPerItem - 1) / kBlocksPerItem, ocl::kGroupSize, device);
-  ocl::Buffer<int> extreme_bits(device, scratch["extremes"]);
-  extreme_bits.write(kNoExtremes);
-
-  decode(0, 1, layer_blocks, below);
-  for (std::uint32_t layer = 0; layer < frame.grid.blocks_z; ++layer) {
-    if (layer + 1 < frame.grid.blocks_z) decode((layer + 1) * layer_blocks, 1, layer_blocks, above);
-    if (extremes != nullptr) kernels.extremes(few_items, layer_blocks, below, extreme_bits);
-    kernels.ranges(layer_range, frame, layer, below, above, thresholds, buffers_->ranges);
-    std::swap(below, above);
-  }
-  kernels.coarse_ranges(coarse_range_, frame, num_coarse_, buffers_->ranges, coarse_ranges_);
+  LayerScratch scratch(device, std::uint64_t{frame.grid.blocks_x} * frame.grid.blocks_y);
+  scratch.thresholds.write(thresholds_);
+  scratch.extremes.write(kNoExtremes);
+  make_ranges(device, frame, stream, kernels, scratch, extremes != nullptr);
   if (extremes != nullptr) {
-    const std::vector<int> bits = extreme_bits.read();
+    const std::vector<int> bits = scratch.extremes.read();
     std::ranges::transform(bits, extremes->begin(), [](int of_value) {
       return std::bit_cast<float>(of_value < 0 ? of_value ^ 0x7FFFFFFF : of_value);
     });
   }
   device.finish();
+}
+
+void Macrocells::make_ranges(ocl::Device &device, const FrameParams &frame,
+                             const DeviceStream &stream, BuildKernels &kernels,
+                             LayerScratch &scratch, bool with_extremes) {
+  Partials decode{device, frame, stream, kernels.partials};
+  const std::uint32_t layer_blocks = frame.grid.blocks_x * frame.grid.blocks_y;
+  const ocl::Range layer_range = ocl::Range::strided(layer_blocks, ocl::kGroupSize, device);
+  constexpr std::uint32_t kBlocksPerItem = 64;
+  const ocl::Range few_items = ocl::Range::strided(
+      (layer_blocks + kBlocksPerItem - 1) / kBlocksPerItem, ocl::kGroupSize, device);
+  decode(0, 1, layer_blocks, scratch.below);
+  for (std::uint32_t layer = 0; layer < frame.grid.blocks_z; ++layer) {
+    if (layer + 1 < frame.grid.blocks_z)
+      decode((layer + 1) * layer_blocks, 1, layer_blocks, scratch.above);
+    if (with_extremes) kernels.extremes(few_items, layer_blocks, scratch.below, scratch.extremes);
+    kernels.ranges(layer_range, frame, layer, scratch.below, scratch.above, scratch.thresholds,
+                   buffers_->ranges);
+    std::swap(scratch.below, scratch.above);
+  }
+  kernels.coarse_ranges(coarse_range_, frame, num_coarse_, buffers_->ranges, coarse_ranges_);
+}
+
+void Macrocells::choose_labels(const FrameParams &frame, const DeviceStream &stream) {
+  const auto stage = of_labels_->device.timer().stage("macrocells");
+  make_ranges(of_labels_->device, frame, stream, of_labels_->kernels, of_labels_->scratch, false);
+  for (Selection &selected : selections_) selected.of.reset();
 }
 
 std::uint64_t Macrocells::setup_scratch_bytes(const glm::uvec3 &num_blocks) {
@@ -184,15 +201,17 @@ void Macrocells::select(const FrameParams &frame, double voxel_error, const Devi
   const auto index_of = [&](double value) { return threshold_index(thresholds_, value); };
   const double isovalue = double{frame.surface.isovalue};
   const StreamLayout layout = moved == nullptr ? StreamLayout{} : moved->layout;
-  const std::array of = {isovalue, voxel_error, double{layout.value_offset},
-                         double{layout.bound_unit}};
+  const uint group = frame.surface.isovalue_index;
+  const std::array of = {of_labels_ ? static_cast<double>(group) : isovalue, voxel_error,
+                         double{layout.value_offset}, double{layout.bound_unit}};
   Selection &selected = selection();
   if (selected.of == of) return;
   selected.of.reset();  // until the masks are there
-  selected.isovalue_index = index_of(isovalue);
+  selected.isovalue_index = of_labels_ ? group : index_of(isovalue);
   selected.active_box.reset();
   std::array<uint, ISO_BOUND_CODES> limits{};
-  for (std::uint32_t code = 0; code < ISO_BOUND_CODES; ++code) {
+  limits[0] = group;
+  for (std::uint32_t code = 0; code < ISO_BOUND_CODES && !of_labels_; ++code) {
     const double offset =
         double{layout.value_offset} + double{layout.bound_unit} * double{block_bound(code)};
     const double error = voxel_error + std::abs(offset);

@@ -43,7 +43,10 @@ class Macrocells {
   ///
   /// num_macrocells  macrocells of its level of detail
   /// num_selections  selections of its MacrocellBuffers
-  static ocl::BufferSizes sizes(std::uint64_t num_macrocells, std::size_t num_selections);
+  /// label_blocks    blocks of a z layer of a volume of labels, which keeps the scratch of
+  ///                 choose_labels(); 0: of another volume
+  static ocl::BufferSizes sizes(std::uint64_t num_macrocells, std::size_t num_selections,
+                                std::uint64_t label_blocks = 0);
   /// Bytes that building needs beside the buffers that stay.
   static std::uint64_t setup_scratch_bytes(const glm::uvec3 &num_blocks);
 
@@ -59,11 +62,20 @@ class Macrocells {
              std::shared_ptr<MacrocellBuffers> buffers = {}, std::vector<float> thresholds = {},
              std::array<float, 2> *extremes = nullptr);
 
+  /// Makes the ranges anew, once labels have been put into other groups. Before the first call, the
+  /// ranges of a volume of labels are not there.
+  ///
+  /// frame   as for the constructor
+  /// stream  the constructor's: DeviceStream::has_groups()
+  /// Waits   if the stream stays on the host
+  void choose_labels(const FrameParams &frame, const DeviceStream &stream);
+
   /// Makes masks() for an isovalue, unless they are those in use. Ranges were made of voxels of all
   /// bit planes, and blocks may since be decoded to other values. So ranges are taken to be wider,
   /// by voxel_error and by the offsets of `moved`.
   ///
-  /// frame        its grid, place and surface.isovalue are used
+  /// frame        its grid, place and surface.isovalue are used; of labels, surface.isovalue_index
+  ///              instead: the group
   /// voxel_error  how far a decoded voxel may be from the one that the ranges were made of
   /// moved        the stream, if its layout raises or lowers voxels; none: it does not
   /// Waits        no
@@ -136,8 +148,31 @@ class Macrocells {
     ocl::Kernel<kernels::macrocell_coarse_ranges> coarse_ranges;
     ocl::Kernel<kernels::macrocell_extremes> extremes;
   };
+  /// Scratch of one z layer.
+  struct LayerScratch {
+    LayerScratch(ocl::Device &device, std::uint64_t layer_blocks)
+        : LayerScratch(device, layer_sizes(layer_blocks)) {}
+    LayerScratch(ocl::Device &device, const ocl::BufferSizes &sizes)
+        : thresholds(device, sizes["range thresholds"]),
+          below(device, sizes["range partials, layer below"]),
+          above(device, sizes["range partials, layer above"]),
+          extremes(device, sizes["extremes"]) {}
+    ocl::Buffer<float> thresholds;
+    ocl::Buffer<VoxelRange> below, above;
+    ocl::Buffer<int> extremes;
+  };
+  /// What choose_labels() needs.
+  struct OfLabels {
+    OfLabels(ocl::Device &of, const ocl::Defines &defines, std::uint64_t layer_blocks)
+        : device(of), kernels(of, defines), scratch(of, layer_blocks) {}
+    ocl::Device &device;
+    BuildKernels kernels;
+    LayerScratch scratch;
+  };
   void compile(ocl::Device &device, const DeviceStream &stream, BuildKernels &kernels,
                bool with_extremes);
+  void make_ranges(ocl::Device &device, const FrameParams &frame, const DeviceStream &stream,
+                   BuildKernels &kernels, LayerScratch &scratch, bool with_extremes);
   void build(ocl::Device &device, const FrameParams &frame, const DeviceStream &stream,
              std::array<float, 2> *extremes);
   std::vector<float> sample_thresholds(ocl::Device &device, std::uint32_t num_blocks,
@@ -150,6 +185,7 @@ class Macrocells {
   ocl::Buffer<uint> limits_;
   std::vector<Selection> selections_;
   std::vector<float> thresholds_;
+  std::unique_ptr<OfLabels> of_labels_;  ///< null: the volume has no labels
   ocl::Kernel<kernels::macrocell_masks> masks_kernel_;
 };
 

@@ -9,6 +9,7 @@ namespace {
 const char *name_in_kernels(SlotType type) {
   switch (type) {
     case SlotType::kUint8:
+    case SlotType::kGroups:
       return "uchar";
     case SlotType::kInt8:
       return "char";
@@ -21,16 +22,29 @@ const char *name_in_kernels(SlotType type) {
   }
 }
 
+std::uint64_t value_bytes(SlotType type) {
+  switch (type) {
+    case SlotType::kUint16:
+    case SlotType::kInt16:
+      return 2;
+    case SlotType::kFloat32:
+      return 4;
+    default:
+      return 1;
+  }
+}
+
 }  // namespace
 
 std::uint64_t slot_bytes(SlotType type) {
-  return std::uint64_t{ISO_BLOCK_VOXELS} * size_of(type);
+  return ISO_BLOCK_VOXELS * value_bytes(type);
 }
 
 ocl::Defines with_slots(ocl::Defines defines, SlotType type) {
   if (type == SlotType::kFloat32) return defines;  // as kernels are without macros
   defines.emplace("ISO_SLOT_VALUE", name_in_kernels(type));
-  defines.emplace("ISO_SLOT_BITS", std::to_string(8 * size_of(type)) + "u");
+  defines.emplace("ISO_SLOT_BITS", std::to_string(8 * value_bytes(type)) + "u");
+  if (type == SlotType::kGroups) defines.emplace("ISO_LABELS", "1");
   return defines;
 }
 
@@ -40,8 +54,18 @@ SlotType slot_type_for(std::span<const CompressedVolume *const> levels, bool wit
   for (const CompressedVolume *level : levels) {
     if (!level->precision.whole_numbers) return SlotType::kFloat32;
   }
-  const VoxelType type = volume.info.type;
-  return is_integer(type) && size_of(type) <= 2 ? type : SlotType::kFloat32;
+  switch (volume.info.type) {
+    case VoxelType::kUint8:
+      return SlotType::kUint8;
+    case VoxelType::kInt8:
+      return SlotType::kInt8;
+    case VoxelType::kUint16:
+      return SlotType::kUint16;
+    case VoxelType::kInt16:
+      return SlotType::kInt16;
+    default:
+      return SlotType::kFloat32;
+  }
 }
 
 SlotType slot_type_for(const CompressedVolume &volume) {

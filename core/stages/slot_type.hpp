@@ -10,8 +10,8 @@
 
 namespace isowave::core {
 
-/// float32, or an integer of 8 or 16 bits.
-using SlotType = VoxelType;
+/// kGroups: bit masks of the groups of labels (kernels_cl/portable/label_table.h).
+enum class SlotType { kFloat32, kUint8, kInt8, kUint16, kInt16, kGroups };
 
 /// A byte of a slot. Kernels read and write values of a SlotType (kernels_cl/device/slot_values.h).
 struct SlotValue {

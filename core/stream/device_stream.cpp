@@ -1,10 +1,12 @@
 #include "core/stream/device_stream.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
 #include "core/base/error.hpp"
+#include "kernels_cl/portable/label_table.h"
 
 namespace isowave::core {
 
@@ -44,12 +46,12 @@ void write_words(const CompressedVolume &volume, std::uint64_t first, ocl::Buffe
   }
 }
 
-/// The buffer of the places of blocks, if they have lengths of their own, then the bounds of their
-/// errors, then the table of voxels without data; no buffer if there is none of them.
+/// The buffer of the places of blocks, if they have lengths of their own, then the table of bytes,
+/// then that of voxels without data; no buffer if there is none of them.
 ocl::BufferSizes index_sizes(std::span<const std::uint32_t> index,
-                             std::span<const std::uint8_t> bounds,
+                             std::span<const std::uint8_t> bytes,
                              std::span<const std::uint32_t> no_data) {
-  const std::uint64_t words = index.size() + (bounds.size() + 3) / 4 + no_data.size();
+  const std::uint64_t words = index.size() + (bytes.size() + 3) / 4 + no_data.size();
   if (words == 0) return {};
   return {ocl::buffer_size<uint>("block index", words)};
 }
@@ -59,9 +61,19 @@ std::span<const std::uint32_t> index_of(const CompressedVolume &volume) {
   return volume.index;
 }
 
-std::span<const std::uint8_t> bounds_of(const CompressedVolume &volume, bool with_bounds) {
-  if (!with_bounds) return {};
-  return volume.bounds.codes;
+std::span<const std::uint8_t> bytes_of(const CompressedVolume &volume, ByteTable bytes) {
+  static constexpr std::array<std::uint8_t, ISO_NUM_LABELS> kInNoGroup{};
+  if (bytes == ByteTable::kNone) return {};
+  return bytes == ByteTable::kBounds ? std::span<const std::uint8_t>(volume.bounds.codes)
+                                     : kInNoGroup;
+}
+
+/// Four bytes a word, the first in bits 0..7.
+std::vector<std::uint32_t> packed(std::span<const std::uint8_t> bytes) {
+  std::vector<std::uint32_t> words((bytes.size() + 3) / 4);
+  for (std::size_t i = 0; i < bytes.size(); ++i)
+    words[i / 4] |= std::uint32_t{bytes[i]} << 8 * (i % 4);
+  return words;
 }
 
 }  // namespace
@@ -84,24 +96,22 @@ StreamSplit split_stream(const CompressedVolume &volume, std::uint64_t largest_p
 }
 
 ocl::BufferSizes DeviceStream::sizes(const CompressedVolume &volume, const StreamSplit &split,
-                                     bool with_bounds) {
+                                     ByteTable bytes) {
   ocl::BufferSizes sizes;
   for (const std::uint64_t words : split.words)
     sizes.add({ocl::buffer_size<uint>("zfp stream", words)});
-  return sizes.add(
-      index_sizes(index_of(volume), bounds_of(volume, with_bounds), volume.no_data.table()));
+  return sizes.add(index_sizes(index_of(volume), bytes_of(volume, bytes), volume.no_data.table()));
 }
 
 /// A window brings the places of its blocks itself.
-ocl::BufferSizes DeviceStream::sizes(const CompressedVolume &volume, OnHost host,
-                                     bool with_bounds) {
+ocl::BufferSizes DeviceStream::sizes(const CompressedVolume &volume, OnHost host, ByteTable bytes) {
   return StreamWindow::sizes(volume, host.window_blocks)
-      .add(index_sizes({}, bounds_of(volume, with_bounds), volume.no_data.table()));
+      .add(index_sizes({}, bytes_of(volume, bytes), volume.no_data.table()));
 }
 
 DeviceStream::DeviceStream(ocl::Device &device, const CompressedVolume &volume,
-                           std::uint64_t largest_part, bool with_bounds)
-    : indexed_(volume.is_indexed()) {
+                           std::uint64_t largest_part, ByteTable bytes)
+    : indexed_(volume.is_indexed()), bytes_(bytes) {
   check_denormals(device, volume);
   const std::uint64_t largest =
       largest_part != 0 ? largest_part : device.capabilities().largest_allocation;
@@ -113,36 +123,36 @@ DeviceStream::DeviceStream(ocl::Device &device, const CompressedVolume &volume,
   }
   layout = layout_of(volume, split.words_per_part);
   std::uint64_t first = 0;
-  for (const ocl::BufferSize &size : sizes(volume, split, with_bounds).named("zfp stream")) {
+  for (const ocl::BufferSize &size : sizes(volume, split, bytes).named("zfp stream")) {
     parts.emplace_back(device, size);
     write_words(volume, first, parts.back());
     first += split.words_per_part;
   }
-  add_index(device, index_of(volume), bounds_of(volume, with_bounds), volume.no_data.table());
+  add_index(device, index_of(volume), bytes_of(volume, bytes), volume.no_data.table());
 }
 
 DeviceStream::DeviceStream(ocl::Device &device, const CompressedVolume &volume, OnHost host,
-                           bool with_bounds)
+                           ByteTable bytes)
     : window(std::make_unique<StreamWindow>(device, volume, host.window_blocks, host.max_copy)),
       layout(layout_of(volume, 0)),
-      indexed_(volume.is_indexed()) {
+      indexed_(volume.is_indexed()),
+      bytes_(bytes) {
   check_denormals(device, volume);
-  add_index(device, {}, bounds_of(volume, with_bounds), volume.no_data.table());
+  add_index(device, {}, bytes_of(volume, bytes), volume.no_data.table());
 }
 
 void DeviceStream::add_index(ocl::Device &device, std::span<const std::uint32_t> index,
-                             std::span<const std::uint8_t> bounds,
+                             std::span<const std::uint8_t> bytes,
                              std::span<const std::uint32_t> no_data) {
   layout.bounds_begin = static_cast<std::uint32_t>(index.size());
-  const ocl::BufferSizes sizes = index_sizes(index, bounds, no_data);
+  const ocl::BufferSizes sizes = index_sizes(index, bytes, no_data);
   if (sizes.size() == 0) return;
   block_index.emplace(device, sizes["block index"]);
   std::vector<std::uint32_t> all;
-  if (!bounds.empty() || !no_data.empty()) {
+  if (!bytes.empty() || !no_data.empty()) {
+    const std::vector<std::uint32_t> words = packed(bytes);
     all.assign(index.begin(), index.end());
-    all.resize(block_index->size() - no_data.size());
-    for (std::size_t block = 0; block < bounds.size(); ++block)
-      all[layout.bounds_begin + block / 4] |= std::uint32_t{bounds[block]} << 8 * (block % 4);
+    all.insert(all.end(), words.begin(), words.end());
     all.insert(all.end(), no_data.begin(), no_data.end());
     index = all;
   }
@@ -153,10 +163,15 @@ void DeviceStream::add_index(ocl::Device &device, std::span<const std::uint32_t>
   block_index->write(index);
 }
 
+void DeviceStream::set_groups(std::span<const std::uint8_t> table) {
+  block_index->write(packed(table), layout.bounds_begin);
+}
+
 ocl::Defines DeviceStream::defines() const {
   ocl::Defines defines;  // none: as kernels are built without a word
   if (parts.size() != 1) defines.emplace("ISO_STREAM_PARTS", parts.empty() ? "0" : "4");
   if (indexed_) defines.emplace("ISO_STREAM_INDEXED", "1");
+  if (has_groups()) defines.emplace("ISO_LABELS", "1");
   if (layout.min_exponent == ISO_REVERSIBLE) defines.emplace("ISO_STREAM_REVERSIBLE", "1");
   return defines;
 }

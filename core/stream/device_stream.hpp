@@ -46,24 +46,38 @@ struct OnHost {
   std::uint64_t max_copy = StreamWindow::default_max_copy();
 };
 
+/// What the index of a stream has a byte of for each block, or for each label.
+enum class ByteTable {
+  kNone,
+  kBounds,  ///< codes of the blocks' bounds, for layout.bound_unit
+  kGroups   ///< groups of the labels (kernels_cl/portable/label_table.h)
+};
+
 class DeviceStream {
  public:
   /// Buffers of a whole stream in such parts, or of a stream behind a window, with the table of
-  /// voxels without data. with_bounds: also the bounds of blocks.
+  /// voxels without data, and that of bytes.
   static ocl::BufferSizes sizes(const CompressedVolume &volume, const StreamSplit &split,
-                                bool with_bounds);
-  static ocl::BufferSizes sizes(const CompressedVolume &volume, OnHost host, bool with_bounds);
+                                ByteTable bytes);
+  static ocl::BufferSizes sizes(const CompressedVolume &volume, OnHost host, ByteTable bytes);
 
   /// Uploads the whole volume and waits.
   ///
   /// largest_part  most bytes of a buffer; 0: what the device allows
-  /// with_bounds   also uploads the bounds of blocks, for layout.bound_unit
+  /// bytes         the table that is there, too; of groups, every label is in none
   /// Throws        Error: four such buffers do not hold the volume
   DeviceStream(ocl::Device &device, const CompressedVolume &volume, std::uint64_t largest_part = 0,
-               bool with_bounds = false);
+               ByteTable bytes = ByteTable::kNone);
   /// Leaves the volume on the host. The volume must outlive the stream.
   DeviceStream(ocl::Device &device, const CompressedVolume &volume, OnHost host,
-               bool with_bounds = false);
+               ByteTable bytes = ByteTable::kNone);
+
+  /// Puts labels into groups, of a stream with ByteTable::kGroups.
+  ///
+  /// table  [ISO_NUM_LABELS]
+  /// Waits  yes
+  void set_groups(std::span<const std::uint8_t> table);
+  bool has_groups() const { return bytes_ == ByteTable::kGroups; }
 
   /// For kernels that include block_stream.h.
   ocl::Defines defines() const;
@@ -71,8 +85,8 @@ class DeviceStream {
   static bool is_window(const ocl::Defines &defines);
   /// Buffer i of 0..3 of a whole stream; the first if there are fewer.
   const ocl::Buffer<uint> &part(std::size_t i) const { return parts[i < parts.size() ? i : 0]; }
-  /// The places of a whole stream's blocks (block_index.h), the bounds of a level of detail, and
-  /// the table of voxels without data; any buffer if there is none of them. words: the window's, if
+  /// The places of a whole stream's blocks (block_index.h), the table of bytes, and that of voxels
+  /// without data; any buffer if there is none of them. words: the window's, if
   /// there is a window.
   const ocl::Buffer<uint> &index() const { return block_index ? *block_index : parts[0]; }
   const ocl::Buffer<uint> &index(const ocl::Buffer<uint> &words) const {
@@ -83,17 +97,18 @@ class DeviceStream {
   }
 
   std::vector<ocl::Buffer<uint>> parts;  ///< 1..4; none if the volume stays on the host
-  /// The places of blocks, their bounds, and the table of voxels without data; empty if the volume
-  /// has none of the three.
+  /// The places of blocks, the table of bytes, and that of voxels without data; empty if there is
+  /// none of the three.
   std::optional<ocl::Buffer<uint>> block_index;
   std::unique_ptr<StreamWindow> window;  ///< if the volume stays on the host
   StreamLayout layout;
 
  private:
   void add_index(ocl::Device &device, std::span<const std::uint32_t> index,
-                 std::span<const std::uint8_t> bounds, std::span<const std::uint32_t> no_data);
+                 std::span<const std::uint8_t> bytes, std::span<const std::uint32_t> no_data);
 
   bool indexed_;
+  ByteTable bytes_;
 };
 
 }  // namespace isowave::core

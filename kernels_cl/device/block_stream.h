@@ -17,6 +17,7 @@
 
 #include "portable/block_bound.h"
 #include "portable/block_index.h"
+#include "portable/label_table.h"
 #include "portable/no_data.h"
 #include "portable/whole_number.h"
 #include "portable/zfp_codec.h"
@@ -32,7 +33,7 @@
 #endif
 
 /// Decodes block block_id, which is number `place` in a window. values [64]: x + 4 y + 16 z; NaN of
-/// voxels without data.
+/// voxels without data; with ISO_LABELS, bit masks of the groups of voxels.
 ISO_INLINE void decode_block(global const uint *part_0, global const uint *part_1,
                              global const uint *part_2, global const uint *part_3,
                              global const uint *index, StreamLayout layout, uint block_id,
@@ -65,6 +66,11 @@ ISO_INLINE void decode_block(global const uint *part_0, global const uint *part_
     ISO_UNROLL
     for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v)
       values[v] = whole_number(values[v], layout.least, layout.greatest);
+  }
+  if (ISO_LABELS) {
+    ISO_UNROLL
+    for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v)
+      values[v] = (float)groups_of_label(index + layout.bounds_begin, values[v]);
   }
   if (layout.value_offset != 0.0f || layout.bound_unit != 0.0f) {
     float bound = 0.0f;

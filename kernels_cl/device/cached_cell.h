@@ -14,8 +14,11 @@ ISO_INLINE void load_corners(const FrameParams *frame, global const BlockEntry *
     const uint vx = (uint)(x + (corner & 1)), vy = (uint)(y + (corner >> 1 & 1)),
                vz = (uint)(z + (corner >> 2));
     const uint slot = cached_slot(frame, table, vx >> 2, vy >> 2, vz >> 2);
-    w[corner] = cache_values[slot * ISO_BLOCK_VOXELS + (vx & 3) + 4 * (vy & 3) + 16 * (vz & 3)] -
-                frame->surface.isovalue;
+    w[corner] =
+        field_of_slot(
+            frame,
+            cache_values[slot * ISO_BLOCK_VOXELS + (vx & 3) + 4 * (vy & 3) + 16 * (vz & 3)]) -
+        frame->surface.isovalue;
   }
 }
 

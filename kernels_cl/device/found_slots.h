@@ -42,13 +42,16 @@ typedef struct CachedStencil {
   global const SlotValue *values;
   local const uint *slots;
   BlockCoords base;
+  uint group;  ///< whose field the voxels are of; only read if ISO_LABELS is 1
 } CachedStencil;
 
 ISO_INLINE float stencil_voxel(const CachedStencil *cached, int x, int y, int z) {
   const uint vx = (uint)x - 4 * cached->base.x, vy = (uint)y - 4 * cached->base.y,
              vz = (uint)z - 4 * cached->base.z;
   const uint slot = cached->slots[((vx >> 2) + 2 * (vy >> 2) + 4 * (vz >> 2)) * ISO_GROUP_SIZE];
-  return cached->values[slot * ISO_BLOCK_VOXELS + (vx & 3) + 4 * (vy & 3) + 16 * (vz & 3)];
+  const float value =
+      cached->values[slot * ISO_BLOCK_VOXELS + (vx & 3) + 4 * (vy & 3) + 16 * (vz & 3)];
+  return ISO_LABELS ? group_field((uint)value, cached->group) : value;
 }
 
 #endif

@@ -24,10 +24,10 @@ ISO_INLINE uint level_of(global const FrameParams *frames, uint num_frames, uint
 ISO_INLINE uint side_of_block(const FrameParams *frame, global const uint *macrocell_masks,
                               global const ushort *ranges, BlockCoords b) {
   if (is_active(frame, macrocell_masks, b)) return ISO_SIDE_UNKNOWN;
-  return ranges[frame->place.ranges_begin + level_block_at(frame, b.x, b.y, b.z)] >> 8 >=
-                 frame->surface.isovalue_index
-             ? ISO_SIDE_INSIDE
-             : ISO_SIDE_OUTSIDE;
+  const uint high = ranges[frame->place.ranges_begin + level_block_at(frame, b.x, b.y, b.z)] >> 8;
+  const int is_inside = ISO_LABELS ? (int)(high >> frame->surface.isovalue_index & 1u)
+                                   : high >= frame->surface.isovalue_index;
+  return is_inside ? ISO_SIDE_INSIDE : ISO_SIDE_OUTSIDE;
 }
 
 /// Does the ray reach the border at t within the brick's own blocks? If so, *b is the one that it

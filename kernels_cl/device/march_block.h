@@ -190,9 +190,10 @@ ISO_INLINE int march_block(const FrameParams *frame, const CacheReader *cache, c
           const int vx = x + (corner & 1), vy = y + (corner >> 1 & 1), vz = z + (corner >> 2);
           const uint slot =
               cache->slots[((vx >> 2) + 2 * (vy >> 2) + 4 * (vz >> 2)) * ISO_GROUP_SIZE];
-          found->w[corner] = cache->values[slot * ISO_BLOCK_VOXELS +
-                                           (uint)((vx & 3) + 4 * (vy & 3) + 16 * (vz & 3))] -
-                             frame->surface.isovalue;
+          found->w[corner] =
+              field_of_slot(frame, cache->values[slot * ISO_BLOCK_VOXELS +
+                                                 (uint)((vx & 3) + 4 * (vy & 3) + 16 * (vz & 3))]) -
+              frame->surface.isovalue;
         }
         if (has_side(side))
           found->at_border = inside_at(ray, found->w, found->at.enter, cell->x, cell->y, cell->z,

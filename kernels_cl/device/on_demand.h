@@ -78,7 +78,7 @@ ISO_INLINE void make_block(BlockMaker *maker, const FrameParams *frame, BlockCoo
                maker->layout, level_block_at(frame, b.x, b.y, b.z), 0, values);
   for (v = 0; v < ISO_BLOCK_VOXELS; ++v) {
     maker->values[slot * ISO_BLOCK_VOXELS + v] = (SlotValue)values[v];
-    inside |= (ulong)(values[v] - maker->isovalue >= 0.0f) << v;
+    inside |= (ulong)(field_of_slot(frame, values[v]) - maker->isovalue >= 0.0f) << v;
   }
   maker->inside[slot] = inside;
   maker->slot_block_ids[slot] = block_id;

@@ -30,17 +30,25 @@ ISO_INLINE uint opened_place(BlockCoords b) {
   return (b.x & 3) + 4 * (b.y & 3) + 16 * (b.z & 3);
 }
 
+/// Four values of the field, side by side in a slot.
+ISO_INLINE float4 field_of_row(const FrameParams *frame, uint row, global const SlotValue *values) {
+  return ISO_LABELS ? convert_float4(
+                          convert_uint4(vload4(row, values)) >> frame->surface.isovalue_index & 1u)
+                    : convert_float4(vload4(row, values));
+}
+
 /// Copies the voxels of a corner of the dual grid to their places in it.
-ISO_INLINE void copy_corner(global const SlotValue *values, uint corner, float *voxels) {
+ISO_INLINE void copy_corner(const FrameParams *frame, global const SlotValue *values, uint corner,
+                            float *voxels) {
   const uint rows = (corner & 2u) != 0 ? 1 : 4, layers = (corner & 4u) != 0 ? 1 : 4;
   float *to = voxels + ((corner & 1u) != 0 ? 4 : 0) + ((corner & 2u) != 0 ? 20 : 0) +
               ((corner & 4u) != 0 ? 100 : 0);
   for (uint z = 0; z < layers; ++z) {
     for (uint y = 0; y < rows; ++y) {
       if ((corner & 1u) != 0)
-        to[5 * y + 25 * z] = values[4 * y + 16 * z];
+        to[5 * y + 25 * z] = field_of_slot(frame, values[4 * y + 16 * z]);
       else
-        vstore4(convert_float4(vload4(y + 4 * z, values)), 0, to + 5 * y + 25 * z);
+        vstore4(field_of_row(frame, y + 4 * z, values), 0, to + 5 * y + 25 * z);
     }
   }
 }
@@ -60,7 +68,7 @@ ISO_SELDOM void open_with_voxels(const CacheReader *cache, const FrameParams *fr
   _Pragma("unroll") for (uint corner = 0; corner < 8; ++corner) {
     const uint slot = cache->slots[corner * ISO_GROUP_SIZE];
     if (slot != ISO_BLOCK_ABSENT)
-      copy_corner(cache->values + slot * ISO_BLOCK_VOXELS, corner, opened->voxels);
+      copy_corner(frame, cache->values + slot * ISO_BLOCK_VOXELS, corner, opened->voxels);
   }
 }
 

@@ -2,11 +2,11 @@
 ///
 /// ISO_SLOT_VALUE, ISO_SLOT_BITS, by -D (core/stages/slot_type.hpp): the type, and its bits. A
 /// volume that has only the values of a short integer type is cached as that type, and read from
-/// the cache as float.
+/// the cache as float. With ISO_LABELS a value is a bit mask of groups (portable/label_table.h).
 #ifndef ISOWAVE_SLOT_VALUES_H
 #define ISOWAVE_SLOT_VALUES_H
 
-#include "portable/shared_types.h"
+#include "portable/label_table.h"
 
 #ifndef ISO_SLOT_VALUE
 #define ISO_SLOT_VALUE float
@@ -17,6 +17,11 @@ typedef ISO_SLOT_VALUE SlotValue;
 
 /// A slot in words.
 #define ISO_SLOT_WORDS (ISO_BLOCK_VOXELS * ISO_SLOT_BITS / 32u)
+
+/// The field's value in a voxel that has this value in its slot.
+ISO_INLINE float field_of_slot(const FrameParams *frame, float value) {
+  return ISO_LABELS ? group_field((uint)value, frame->surface.isovalue_index) : value;
+}
 
 /// Word w of a slot with these values.
 ISO_INLINE uint slot_word(const float *values, uint w) {

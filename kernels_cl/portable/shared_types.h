@@ -81,6 +81,10 @@ inline uint popcount(uint x) {
 #endif
 #endif
 
+#ifndef ISO_LABELS   /* by -D, of renderers of labels (core/frame/labels.hpp) */
+#define ISO_LABELS 0 /* 1: voxels are labels, and values in the cache are bit masks of groups */
+#endif
+
 #ifndef ISO_NO_DATA /* by -D, of devices that draw such volumes: ocl::Device::draw_no_data() */
 #ifdef __OPENCL_C_VERSION__
 #define ISO_NO_DATA 0 /* no voxel is NaN */
@@ -192,7 +196,8 @@ ISO_CHECK_SIZE(ClipParams, 460);
 /// The isosurface, and the box of its blocks.
 typedef struct Surface {
   float isovalue;
-  uint isovalue_index;  ///< the first threshold of macrocells.cl that is >= it
+  uint isovalue_index;  ///< the first threshold of macrocells.cl that is >= it; of a renderer of
+                        ///< labels, the number of its group
   /// Box around the active blocks, whole macrocells: from begin to below end [blocks]; empty if
   /// active_end_x = 0.
   int active_begin_x, active_begin_y, active_begin_z, active_end_x, active_end_y, active_end_z;
@@ -293,7 +298,7 @@ typedef struct StreamLayout {
   /// block_bound() of its code, of codes that begin with word bounds_begin of the index. Both 0:
   /// nothing.
   float value_offset, bound_unit;
-  uint bounds_begin;
+  uint bounds_begin;     ///< of a renderer of labels, the same word of the table of label_table.h
   uint bounds_by_place;  ///< not 0: of its block's bound, a voxel has bound_share() of its place
   uint no_data_begin;    ///< word of the index that the table of no_data.h begins with;
                          ///< ISO_INVALID_ID: all voxels have data. Only read if ISO_NO_DATA is 1

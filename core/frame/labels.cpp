@@ -1,0 +1,46 @@
+#include "core/frame/labels.hpp"
+
+#include <cmath>
+
+#include "core/base/error.hpp"
+
+namespace isowave::core {
+
+std::vector<std::uint16_t> labels_of(std::span<const float> values) {
+  std::vector<std::uint16_t> labels;
+  labels.reserve(values.size());
+  for (const float value : values) {
+    if (!(value >= 0 && value < float{ISO_NUM_LABELS} && value == std::floor(value)))
+      throw Error("{} is no label: labels are whole numbers, 0 to {}", value, ISO_NUM_LABELS - 1);
+    labels.push_back(static_cast<std::uint16_t>(value));
+  }
+  return labels;
+}
+
+LabelTable label_table(const std::vector<SurfaceStyle> &surfaces) {
+  LabelTable table(ISO_NUM_LABELS);
+  for (std::size_t i = 0; i < surfaces.size(); ++i) {
+    for (const std::uint16_t label : surfaces[i].labels)
+      table[label] = static_cast<std::uint8_t>(table[label] | 1u << i);
+  }
+  return table;
+}
+
+void check_labels(const CompressedVolume &volume) {
+  if (volume.info.brick != BrickOf{})
+    throw Error("labels are drawn by one process alone: leave out mpirun and bricks");
+  if (!is_integer(volume.info.type))
+    throw Error("voxels of type {} are no labels: give a volume of integers",
+                to_string(volume.info.type));
+  if (!volume.precision.is_reversible() && !volume.precision.whole_numbers)
+    throw Error("the volume was compressed with a loss, and labels are exact: compress it without");
+  if (!volume.no_data.empty())
+    throw Error("{} voxels have no data, and each voxel has a label: give no value for them",
+                volume.no_data.num_voxels());
+  const auto [least, most] = volume.value_range;
+  if (!(least >= 0 && most < float{ISO_NUM_LABELS}))
+    throw Error("the volume's values, {} to {}, are no labels: labels are 0 to {}", least, most,
+                ISO_NUM_LABELS - 1);
+}
+
+}  // namespace isowave::core
