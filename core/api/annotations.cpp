@@ -250,7 +250,11 @@ AnnotationGroup caption(const Sheet &sheet, const Annotations &wanted,
                                sheet.line() / 2,
                                ink});
     }
-    std::string text = fmt::format("isovalue {:.8g}", surface.isovalue);
+    constexpr std::size_t kMostOfLabels = 40;  // letters
+    std::string text = surface.labels.empty()
+                           ? fmt::format("isovalue {:.8g}", surface.isovalue)
+                           : fmt::format("label{} {:.{}}", surface.labels.size() == 1 ? "" : "s",
+                                         text_of_labels(surface), kMostOfLabels);
     if (surface.opacity < 1) text += fmt::format(", opacity {:.3g}", surface.opacity);
     group.texts.push_back(sheet.text(text, {left + (has_own_colors ? 1.35 * font : 0), y}, 0, ink));
     y += kLineHeight * font;

@@ -117,6 +117,8 @@ Renderer make_team_renderer(Processes &processes, const std::filesystem::path &p
                             const Compression &compression, const RawFile &raw,
                             const BrickOptions &options) {
   return guarded("making a renderer", [&] {
+    if (options.renderer.with_labels)
+      throw core::Error("labels are drawn by one process alone: leave out with_labels");
     const auto held = std::make_shared<TeamHeld>(processes);
     open(*held, path.string(), compression, raw, options);
     const core::TeamVolume &volume = held->volume.value();

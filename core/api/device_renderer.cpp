@@ -21,6 +21,7 @@ core::RendererOptions core_options(const RendererOptions &options, std::uint32_t
   result.with_kept_picture = options.with_time_budget;
   result.with_given_rays = options.with_rays;
   result.max_surfaces = options.with_surfaces;
+  result.with_labels = options.with_labels;
   if (options.field) result.field = &options.field->implementation().volume;
   return result;
 }

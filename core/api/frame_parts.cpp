@@ -73,6 +73,39 @@ core::Clip core_clip(const std::vector<ClipPlane> &planes, bool caps) {
   return clip;
 }
 
+core::SurfaceStyle core_style(const Surface &surface) {
+  core::SurfaceStyle style{
+      .color = to_glm(surface.color), .opacity = surface.opacity, .clipped = surface.clipped};
+  for (const std::uint32_t label : surface.labels) {
+    if (label >= ISO_NUM_LABELS)
+      throw core::Error("{} is no label: labels are 0 to {}", label, ISO_NUM_LABELS - 1);
+    style.labels.push_back(static_cast<std::uint16_t>(label));
+  }
+  return style;
+}
+
+std::string text_of_labels(const Surface &surface) {
+  std::string text;
+  const std::vector<std::uint32_t> &labels = surface.labels;
+  for (std::size_t i = 0; i < labels.size();) {
+    std::size_t end = i + 1;
+    while (end < labels.size() && labels[end] == labels[end - 1] + 1) ++end;
+    text += fmt::format("{}{}", text.empty() ? "" : "+", labels[i]);
+    if (end - i > 1) text += fmt::format("-{}", labels[end - 1]);
+    i = end;
+  }
+  return text;
+}
+
+std::vector<double> values_of(const std::vector<Surface> &surfaces) {
+  std::vector<double> values;
+  for (const Surface &surface : surfaces) {
+    if (surface.labels.empty()) values.push_back(surface.isovalue);
+    values.insert(values.end(), surface.labels.begin(), surface.labels.end());
+  }
+  return values;
+}
+
 core::ColorTable color_table_of(const std::string &map,
                                 const std::vector<std::array<float, 3>> &colors) {
   if (colors.empty()) return core::color_map(map);
@@ -152,9 +185,11 @@ core::Slices core_slices(const std::vector<Slice> &slices, const Appearance &app
 core::FrameRequest core_request(const FrameRequest &request, const core::CompressedVolume &volume) {
   core::FrameRequest result;
   result.camera = core_camera(request.camera);
-  for (const Surface &surface : request.surfaces)
-    result.surfaces.push_back({core::drawn_isovalue(volume, surface.isovalue),
-                               to_glm(surface.color), surface.opacity, surface.clipped});
+  for (const Surface &surface : request.surfaces) {
+    result.surfaces.push_back(core_style(surface));
+    if (surface.labels.empty())
+      result.surfaces.back().isovalue = core::drawn_isovalue(volume, surface.isovalue);
+  }
   result.slices = core_slices(request.slices, request.appearance, volume.value_range);
   if (result.surfaces.empty() && !request.slices.empty())
     result.surfaces.push_back(

@@ -160,6 +160,16 @@ std::vector<Camera> Renderer::Implementation::turntable(std::span<const double> 
   });
 }
 
+std::vector<Camera> Renderer::Implementation::turntable(const std::vector<Surface> &surfaces,
+                                                        std::uint32_t num_views,
+                                                        std::optional<ImageSize> size) {
+  const bool has_labels =
+      std::ranges::any_of(surfaces, [](const Surface &surface) { return !surface.labels.empty(); });
+  if (has_labels && !renderer_->abilities().labels)
+    throw Error("this renderer draws no labels: make it with_labels, on a device");
+  return turntable(std::span<const double>(values_of(surfaces)), num_views, size);
+}
+
 bool Renderer::Implementation::can_draw(const FrameRequest &request) const {
   return isowave::can_draw(request, renderer_->abilities(), volume_);
 }
@@ -201,9 +211,7 @@ Camera Renderer::camera(const std::vector<Surface> &surfaces, std::optional<Imag
 }
 std::vector<Camera> Renderer::turntable(const std::vector<Surface> &surfaces,
                                         std::uint32_t num_views, std::optional<ImageSize> size) {
-  std::vector<double> isovalues(surfaces.size());
-  std::ranges::transform(surfaces, isovalues.begin(), &Surface::isovalue);
-  return implementation_->turntable(isovalues, num_views, size);
+  return implementation_->turntable(surfaces, num_views, size);
 }
 bool Renderer::can_draw(const FrameRequest &request) const {
   return implementation_->can_draw(request);

@@ -125,6 +125,14 @@ bool is_needed(std::string_view key) {
   if constexpr (std::is_same_v<Object, Surface>) return key == "isovalue";
   if constexpr (std::is_same_v<Object, Scene>) return key == "surfaces";
 }
+/// Whether it is a surface of labels, which needs no isovalue.
+template <class Object>
+bool has_labels(const json &value) {
+  if (!std::is_same_v<Object, Surface>) return false;
+  const auto labels = value.find("labels");
+  return labels != value.end() && !labels->empty();
+}
+
 template <HasFields Object>
 void read_value(const json &value, const std::string &where, Object &object);
 
@@ -153,7 +161,7 @@ void read_value(const json &value, const std::string &where, Object &object) {
     const std::string place = member_place(where, key);
     if (const auto found = value.find(key); found != value.end()) {
       read_value(*found, place, field);
-    } else if (is_needed<Object>(key)) {
+    } else if (is_needed<Object>(key) && !has_labels<Object>(value)) {
       throw core::Error("{} is missing", place);
     }
   });
@@ -225,8 +233,9 @@ ordered_json value_of(const Object &object) {
   ordered_json result = ordered_json::object();
   const ordered_json all = all_fields(object);
   for (const auto &[key, value] : all.items()) {
-    // A surface's default colour depends on its place.
-    const bool is_always = is_needed<Object>(key) || key == "color";
+    // A surface's default colour depends on its place. If it has labels, it has no isovalue.
+    const bool is_always =
+        key == "isovalue" ? all["labels"].empty() : is_needed<Object>(key) || key == "color";
     if (is_always || value != defaults[key]) result[key] = value;
   }
   return result;
@@ -250,9 +259,10 @@ std::string text_of_json(const ordered_json &value, const std::string &indent) {
 void check(const Scene &scene) {
   if (scene.surfaces.empty()) throw core::Error("surfaces: give at least one");
   std::vector<core::SurfaceStyle> styles;
-  for (const Surface &surface : scene.surfaces)
-    styles.push_back(
-        {static_cast<float>(surface.isovalue), to_glm(surface.color), surface.opacity});
+  for (const Surface &surface : scene.surfaces) {
+    styles.push_back(core_style(surface));
+    styles.back().isovalue = static_cast<float>(surface.isovalue);
+  }
   core::check_surfaces(styles, core_slices(scene.slices, scene.appearance, {0, 1}));
   core::check_clip(core_clip(scene.clip, scene.caps));
   if (scene.appearance.color_low.has_value() != scene.appearance.color_high.has_value())
@@ -352,7 +362,7 @@ FrameRequest scene_request(const Scene &scene) {
   if (scene.surfaces.empty()) return request;
   request.isovalue = scene.surfaces.front().isovalue;
   const Surface &first = scene.surfaces.front();
-  if (scene.surfaces.size() == 1 && first.opacity == 1 && first.clipped) {
+  if (scene.surfaces.size() == 1 && first.opacity == 1 && first.clipped && first.labels.empty()) {
     request.appearance.surface = first.color;
   } else {
     request.surfaces = scene.surfaces;

@@ -160,6 +160,18 @@ void FrameOfMany::write_refined(isowave::FrameRequest request) const {
              refined.statistics.total_ms);
 }
 
+/// "isovalues 40, 90", "labels 3, 5+7-9".
+std::string text_of_surfaces(const RenderArgs &options, double isovalue) {
+  if (has_labels(options.surfaces)) {
+    std::vector<std::string> groups;
+    std::ranges::transform(options.surfaces, std::back_inserter(groups), text_of_labels);
+    return fmt::format("labels {}", fmt::join(groups, ", "));
+  }
+  const std::vector<double> isovalues =
+      options.surfaces.empty() ? std::vector{isovalue} : all_isovalues(options);
+  return fmt::format("isovalue{} {}", isovalues.size() == 1 ? "" : "s", fmt::join(isovalues, ", "));
+}
+
 /// Draws one frame and all that is asked of it.
 ///
 /// own      gets this process's statistics
@@ -178,11 +190,9 @@ ordered_json draw_frame(const FrameOfMany &frame, ordered_json &own) {
                    drawing.on_host());
   if (frame.step) own["step"] = *frame.step;
   ordered_json entry = own;
-  const std::vector<double> isovalues =
-      options.surfaces.empty() ? std::vector{frame.isovalue} : all_isovalues(options);
-  const std::string what = fmt::format(
-      "{}isovalue{} {}, view {}", frame.step ? fmt::format("step {}, ", *frame.step) : "",
-      isovalues.size() == 1 ? "" : "s", fmt::join(isovalues, ", "), frame.view);
+  const std::string what =
+      fmt::format("{}{}, view {}", frame.step ? fmt::format("step {}, ", *frame.step) : "",
+                  text_of_surfaces(options, frame.isovalue), frame.view);
   if (drawing.is_team()) {
     const double ms = ms_since(begin) - last.certificate.total_ms;
     fmt::print("{}: {} rays hit, {} bricks, {:.1f} ms\n", what, with_commas(num_hits),
@@ -352,7 +362,9 @@ void set_up(const CLI::App &command, RenderArgs &options, Drawing &drawing) {
   if (compiling) compiling->finish();
   const bool fits_surface = options.frame.orbit == 0 && !drawing.views.file;
   if (fits_surface) {
-    const auto isovalues = drawn_isovalues(drawing.volume(), all_isovalues(options));
+    const auto isovalues =
+        drawn_isovalues(drawing.volume(), options.surfaces.empty() ? options.frame.isovalues
+                                                                   : values_of(options.surfaces));
     const std::uint32_t num_views = drawing.views.count;
     drawing.cameras = turntable(
         drawing.renderer->core().camera(isovalues, drawing.views.size, num_views), num_views);
@@ -363,7 +375,8 @@ void set_up(const CLI::App &command, RenderArgs &options, Drawing &drawing) {
 
 /// What is drawn, as options say it.
 void read_scene_of_options(RenderArgs &options, Drawing &drawing) {
-  options.surfaces = read_surfaces(options.surface_texts);
+  options.surfaces = options.label_texts.empty() ? read_surfaces(options.surface_texts)
+                                                 : read_labels(options.label_texts);
   if (!options.surfaces.empty()) options.frame.isovalues = {options.surfaces.front().isovalue};
   drawing.appearance.surface = parse_color("--color", options.color);
   read_background(options.background, drawing.appearance);

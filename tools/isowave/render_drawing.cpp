@@ -34,6 +34,7 @@ void set_wanted(RenderArgs &options) {
   wanted.with_given_rays = options.ambient_rays != 0 || options.light.shadow_rays != 0;
   wanted.with_bounds = draws_bounds(options);
   wanted.max_surfaces = static_cast<std::uint32_t>(options.surfaces.size());
+  wanted.with_labels = has_labels(options.surfaces);
   if (draws_layers(options)) wanted.max_surfaces = std::max(wanted.max_surfaces, 1u);
   options.frame.compression.measure_error |= wanted.with_bounds;
   if (!wanted.with_shading) options.normals = to_string(Normals::kCell);  // no picture shows them
@@ -42,7 +43,8 @@ void set_wanted(RenderArgs &options) {
 void choose_drawing(const CLI::App &command, const RenderArgs &options, Drawing &drawing) {
   if (options.reference || drawing.is_team()) return;
   drawing.draws_on = ocl::choose_drawing(options.device);
-  const std::string option = find_device_option(command);
+  const std::string option =
+      has_labels(options.surfaces) ? "--labels" : find_device_option(command);
   if (option.empty() || !drawing.on_host()) return;
   if (drawing.draws_on == ocl::DrawsOn::kHost)
     throw Error("{}: the host has no such option: leave it out, or name a device", option);

@@ -20,6 +20,7 @@ namespace fs = std::filesystem;
 
 std::vector<double> all_isovalues(const RenderArgs &options) {
   if (options.surfaces.empty()) return options.frame.isovalues;
+  if (has_labels(options.surfaces)) return {};
   std::vector<double> isovalues;
   for (const isowave::Surface &surface : options.surfaces) isovalues.push_back(surface.isovalue);
   return isovalues;
@@ -47,6 +48,7 @@ std::string default_image(const RenderArgs &options, std::size_t num_views) {
   const bool frame_path_has_isovalue =
       num_frames(options, num_views) > 1 && options.surfaces.empty();
   if (frame_path_has_isovalue || options.frame.isovalues.empty()) return stem + ".png";
+  if (has_labels(options.surfaces)) return stem + "_labels.png";
   return fmt::format("{}_iso{}.png", stem, fmt::join(all_isovalues(options), "_"));
 }
 
@@ -129,9 +131,32 @@ void check_slice_options(const CLI::App &command, const RenderArgs &options, con
     refuse_options(command, {"--slice"}, "needs --solver bernstein");
 }
 
+/// Checks what --labels excludes.
+void check_label_options(const CLI::App &command, const RenderArgs &options, const Team &team) {
+  if (team.size() > 1) throw Error("labels are drawn by one process alone: leave out mpirun");
+  refuse_options(command, {"--isovalue", "--surface"},
+                 "--labels draws surfaces of labels alone: leave out either");
+  refuse_options(command, {"--color"}, "surfaces have colours of their own: --labels LABELS,COLOR");
+  refuse_options(command,
+                 {"--ambient", "--shadow", "--voxel-pixels", "--voxel-error", "--max-surface-error",
+                  "--time-budget", "--slice", "--reference", "--rate", "--tolerance",
+                  "--tolerance-relative", "--no-data"},
+                 "labels are drawn without it: leave it out");
+  if (options.color_map.by_field) throw Error("labels are drawn without colours by a field");
+  if (!options.slices.empty()) throw Error("labels are drawn without slices");
+  if (options.renderer_flags.pipeline == "blocks")
+    refuse_options(command, {"--pipeline"}, "pipeline blocks draws no labels: leave it out");
+  if (solver_from_string(options.renderer_flags.solver).kind != kDefaultSolver.kind)
+    refuse_options(command, {"--solver"}, "labels need --solver bernstein");
+}
+
 /// Checks what --surface excludes. Further options that exclude each other are checked by each.
 void check_surface_options(const CLI::App &command, const RenderArgs &options, const Team &team) {
   if (options.surfaces.empty()) return;
+  if (has_labels(options.surfaces)) {
+    check_label_options(command, options, team);
+    return;
+  }
   refuse_options(command, {"--isovalue"},
                  "draws pictures of one surface each, --surface one of all: leave out either");
   refuse_options(command, {"--color"}, "surfaces have colours of their own: --surface VALUE,COLOR");
@@ -288,12 +313,13 @@ namespace {
 
 /// Options of every day come first, those of researchers last.
 void group_render_options(CLI::App &command) {
-  group_options(command, "Options of every day",
-                {"--help",       "--isovalue",    "--surface",  "--scene",     "--output",
-                 "--size",       "--samples",     "--orbit",    "--turntable", "--steps",
-                 "--cameras",    "--parallel",    "--color",    "--color-by",  "--color-map",
-                 "--background", "--transparent", "--light",    "--shadow",    "--light-angle",
-                 "--normals",    "--ambient",     "--annotate", "--units",     "--device"});
+  group_options(
+      command, "Options of every day",
+      {"--help",     "--isovalue", "--surface",     "--labels",    "--scene",      "--output",
+       "--size",     "--samples",  "--orbit",       "--turntable", "--steps",      "--cameras",
+       "--parallel", "--color",    "--color-by",    "--color-map", "--background", "--transparent",
+       "--light",    "--shadow",   "--light-angle", "--normals",   "--ambient",    "--annotate",
+       "--units",    "--device"});
   group_options(command, "Clipping and slices",
                 {"--clip", "--clip-box", "--no-caps", "--slice", "--slice-opacity", "--slice-map",
                  "--slice-range"});
@@ -371,6 +397,7 @@ void add_render_options(CLI::App &command, RenderArgs &options) {
           "isovalue; repeat it for more pictures, of each isovalue from all views [the first that "
           "`isowave info` suggests]");
   add_surface_option(command, options.surface_texts);
+  add_labels_option(command, options.label_texts);
   add_scene_options(command, options.scene);
   command
       .add_option("--samples", options.frame.samples,

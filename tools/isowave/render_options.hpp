@@ -13,6 +13,7 @@
 #include "tools/isowave/annotate.hpp"
 #include "tools/isowave/clip_options.hpp"
 #include "tools/isowave/frame_options.hpp"
+#include "tools/isowave/label_options.hpp"
 #include "tools/isowave/outputs.hpp"
 #include "tools/isowave/renderer_options.hpp"
 #include "tools/isowave/scene_options.hpp"
@@ -26,6 +27,7 @@ struct RenderArgs {
   std::string input;
   SceneOptions scene;
   std::vector<std::string> surface_texts;  ///< --surface, as typed
+  std::vector<std::string> label_texts;    ///< --labels, as typed
   /// What they ask for: one picture of each view. frame.isovalues has the first one's.
   std::vector<isowave::Surface> surfaces;
   VolumeOptions volume;
@@ -64,7 +66,7 @@ struct RenderArgs {
 
 void add_render_options(CLI::App &command, RenderArgs &options);
 
-/// The isovalues of all surfaces, in one picture or in several.
+/// The isovalues of all surfaces, in one picture or in several. None of surfaces of labels.
 std::vector<double> all_isovalues(const RenderArgs &options);
 /// Number of frames of a step; as for one isovalue if there is none yet.
 std::size_t num_frames(const RenderArgs &options, std::size_t num_views);
@@ -73,8 +75,9 @@ std::size_t num_frames(const RenderArgs &options, std::size_t num_views);
 std::filesystem::path frame_path(const std::filesystem::path &path, std::size_t num_views,
                                  const RenderArgs &options, double isovalue, std::size_t view,
                                  std::optional<std::size_t> step);
-/// VOLUME_iso40.png in the current folder, VOLUME_iso40_90.png with --surface, VOLUME.png if there
-/// is no isovalue yet; frame_path() says the rest for several frames.
+/// VOLUME_iso40.png in the current folder, VOLUME_iso40_90.png with --surface, VOLUME_labels.png
+/// with
+/// --labels, VOLUME.png if there is no isovalue yet; frame_path() says the rest for several frames.
 std::string default_image(const RenderArgs &options, std::size_t num_views);
 
 /// Whether frames have layers: several or translucent surfaces, or slices.

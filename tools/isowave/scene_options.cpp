@@ -14,11 +14,12 @@ void add_scene_options(CLI::App &command, SceneOptions &options) {
 }
 
 Scene read_scene_option(const CLI::App &command, const SceneOptions &options) {
-  refuse_options(command,
-                 {"--isovalue", "--surface", "--color", "--color-by", "--color-map", "--background",
-                  "--transparent", "--light", "--shadow", "--light-angle", "--clip", "--clip-box",
-                  "--no-caps", "--slice", "--slice-opacity", "--slice-map", "--slice-range"},
-                 "--scene says what is drawn: leave out either");
+  refuse_options(
+      command,
+      {"--isovalue", "--surface", "--labels", "--color", "--color-by", "--color-map",
+       "--background", "--transparent", "--light", "--shadow", "--light-angle", "--clip",
+       "--clip-box", "--no-caps", "--slice", "--slice-opacity", "--slice-map", "--slice-range"},
+      "--scene says what is drawn: leave out either");
   return isowave::read_scene(options.file);
 }
 

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "core/api/convert.hpp"
+#include "core/api/frame_parts.hpp"
 #include "core/base/error.hpp"
 #include "core/frame/colors.hpp"
 #include "core/frame/surfaces.hpp"
@@ -177,9 +178,8 @@ std::vector<isowave::Surface> read_surfaces(const std::vector<std::string> &text
   std::vector<SurfaceStyle> styles;
   for (const std::string &text : texts) {
     surfaces.push_back(parse_surface(text, surfaces.size()));
-    const isowave::Surface &surface = surfaces.back();
-    styles.push_back(
-        {static_cast<float>(surface.isovalue), to_glm(surface.color), surface.opacity});
+    styles.push_back(core_style(surfaces.back()));
+    styles.back().isovalue = static_cast<float>(surfaces.back().isovalue);
   }
   check_surfaces(styles);
   return surfaces;
@@ -200,11 +200,12 @@ void add_surface_option(CLI::App &command, std::vector<std::string> &texts) {
 
 nlohmann::ordered_json surfaces_json(const std::vector<isowave::Surface> &surfaces) {
   nlohmann::ordered_json json = nlohmann::ordered_json::array();
-  for (const isowave::Surface &surface : surfaces)
+  for (const isowave::Surface &surface : surfaces) {
+    nlohmann::ordered_json &entry = json.emplace_back();
     for_each_surface_field(surface,
-                           [&, &entry = json.emplace_back()](const char *name, const auto &field) {
-                             entry[name] = field;
-                           });
+                           [&](const char *name, const auto &field) { entry[name] = field; });
+    entry.erase(surface.labels.empty() ? "labels" : "isovalue");
+  }
   return json;
 }
 

@@ -57,7 +57,7 @@ void add_surface_option(CLI::App &command, std::vector<std::string> &texts);
 /// Throws  Error in one line: what the options cannot mean, for any volume
 std::vector<isowave::Surface> read_surfaces(const std::vector<std::string> &texts);
 
-/// [{isovalue, color, opacity, clipped}]; color: red, green, blue, 0 to 1.
+/// [{isovalue, color, opacity, clipped}], or labels for isovalue; color: red, green, blue, 0 to 1.
 nlohmann::ordered_json surfaces_json(const std::vector<isowave::Surface> &surfaces);
 
 }  // namespace isowave::core::tools

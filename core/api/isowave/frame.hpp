@@ -122,12 +122,16 @@ struct ClipPlane {
 /// Throws  Error: the box has no inside
 std::array<ClipPlane, 6> box_planes(const Vector3 &begin, const Vector3 &end);
 
-/// An isosurface of a frame of several or translucent ones.
+/// An isosurface of a frame of several or translucent ones, or the surface of a group of labels.
 struct Surface {
   double isovalue = 0;  ///< as FrameRequest::isovalue; each surface has its own
   std::array<float, 3> color = Appearance{}.surface;  ///< sRGB, 0 to 1
   float opacity = 1;    ///< of each crossing, above 0; 1: nothing behind it is seen
   bool clipped = true;  ///< false: clipping planes leave it whole
+  /// Labels of a segmentation, 0 to 65,535, instead of `isovalue`: the surface is that of their
+  /// indicator, which is 1 at voxels with one of them and 0 at the others, at 0.5. Needs
+  /// RendererOptions::with_labels. Surfaces may have labels in common.
+  std::vector<std::uint32_t> labels{};
 };
 
 /// A plane of a frame that shows the voxels: the points p with dot(normal, p) = offset. Voxels are
@@ -239,6 +243,7 @@ void for_each_plane_field(AnyPlane &plane, const Visit &visit) {
 template <class AnySurface, class Visit>
 void for_each_surface_field(AnySurface &surface, const Visit &visit) {
   visit("isovalue", surface.isovalue);
+  visit("labels", surface.labels);
   visit("color", surface.color);
   visit("opacity", surface.opacity);
   visit("clipped", surface.clipped);

@@ -11,11 +11,11 @@
 //    "clip": [{"normal": [0, 0, -1], "offset": -60}],
 //    "background": "black"}
 //
-// Its keys are the fields of Scene and of Appearance, except `surface`. isowave_scene, surfaces,
-// each isovalue, each normal of a plane or slice, and eye and at of a camera are needed; for the
-// rest there are defaults. A colour is "#RRGGBB", a name of parse_color(), or red, green and blue
-// from 0 to 1.
-// A second volume colours the surface by its values with
+// Its keys are the fields of Scene and of Appearance, except `surface`. A surface of labels has
+// "labels": [5, 7] instead of an isovalue. isowave_scene, surfaces, each isovalue, each normal of a
+// plane or slice, and eye and at of a camera are needed; for the rest there are defaults. A colour
+// is "#RRGGBB", a name of parse_color(), or red, green and blue from 0 to 1. A second volume
+// colours the surface by its values with
 //
 //    "field": "temperature.nrrd", "color_map": "magma", "color_by_field": true
 
