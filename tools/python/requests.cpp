@@ -103,6 +103,7 @@ nb::dict dict_of(const isowave::Scene &scene) {
       for (const isowave::Surface &surface : field) {
         nb::dict fields;
         for_each_surface_field(surface, field_writer_to(fields));
+        if (surface.labels.empty()) nb::del(fields["labels"]);
         surfaces.append(fields);
       }
       result[name] = surfaces;
@@ -136,6 +137,7 @@ isowave::RendererOptions renderer_options_of(const nb::dict &options) {
   get("with_time_budget", result.with_time_budget);
   get("with_rays", result.with_rays);
   get("with_surfaces", result.with_surfaces);
+  get("with_labels", result.with_labels);
   return result;
 }
 

@@ -19,12 +19,19 @@ from isowave._image import Image
 from isowave._placed import Placed
 from isowave._renderer import draw, renderer_options, warn_of_isovalue
 from isowave._request import Request, isovalue_or_surfaces
-from isowave._surface import Surface, surfaces_of
+from isowave._surface import Surface
 
 OUTPUTS = ("rgb", "depth", "normals")
 ALL_OUTPUTS = (*OUTPUTS, "bounds")
 
 Result = TypeVar("Result")
+
+
+def without_labels(request: Request) -> Request:
+    """The request itself. Raises TypeError if it has surfaces of labels."""
+    if request.has_labels:
+        raise TypeError("a BrickRenderer draws without labels")
+    return request
 
 
 class Processes:
@@ -182,7 +189,7 @@ class BrickRenderer(Placed[_core.Renderer]):
 
         def ask() -> tuple[list[float], int, tuple[int, int]]:
             value = given_isovalue(isovalue_or_surfaces(isovalue, surfaces))
-            wanted = [each.isovalue for each in surfaces_of(surfaces)] or [value]
+            wanted = without_labels(Request(value, surfaces=surfaces)).isovalues
             count = view_count(num_views)
             return wanted, count, self.size if size is None else size_of(size)
 
@@ -233,7 +240,7 @@ class BrickRenderer(Placed[_core.Renderer]):
             for name in ("time_budget", "on_pass"):
                 if getattr(request, name) is not None:
                     raise TypeError(f"a BrickRenderer draws without {name}")
-            return request
+            return without_labels(request)
 
         request = self._processes.together(ask)
         if len(set(self._processes.all_gather(b"" if camera is None else b"given"))) > 1:

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from isowave import _core
 from isowave._checked import flag
 from isowave._request import Request, rgb_of
+from isowave._surface import Surface
 
 WHITE = (1.0, 1.0, 1.0)  # the background if none is given, as isowave::Appearance has it
 
@@ -165,6 +166,9 @@ class Image:
         shown = ""
         if self._picture is not None:
             shown = f"{self._picture.shape[1]} x {self._picture.shape[0]}, "
-        isovalues = [each.isovalue for each in self.surfaces] or [self.isovalue]
-        plural = "s" if len(isovalues) > 1 else ""
-        return f"<isowave.Image {shown}isovalue{plural} {', '.join(f'{v:g}' for v in isovalues)}>"
+        surfaces = self.surfaces or (Surface(self.isovalue),)
+        if surfaces[0].labels:
+            return f"<isowave.Image {shown}{'; '.join(each.text for each in surfaces)}>"
+        plural = "s" if len(surfaces) > 1 else ""
+        isovalues = ", ".join(f"{each.isovalue:g}" for each in surfaces)
+        return f"<isowave.Image {shown}isovalue{plural} {isovalues}>"

@@ -31,11 +31,16 @@ CAPABILITIES: dict[str, int] = {
     "bounds": False,
     "time_budget": False,
     "rays": False,
+    "labels": False,
     "surfaces": 0,
 }
 
 
-ON_HOST: dict[str, int] = {**dict.fromkeys(CAPABILITIES, True), "surfaces": MAX_SURFACES}
+ON_HOST: dict[str, int] = {
+    **dict.fromkeys(CAPABILITIES, True),
+    "labels": False,
+    "surfaces": MAX_SURFACES,
+}
 
 
 def renderer_options(
@@ -121,6 +126,10 @@ class Renderer:
         `time_budget`; have `ambient` rays, and cast_rays() may be called. On the host they may.
     surfaces
         How many `surfaces` frames may have, up to 8. Frames of the host may have 8.
+    labels
+        Frames have surfaces of labels alone, Surface(labels=...), on a device. Needs surfaces=; not
+        with levels, bounds, time_budget, rays and field. Other labels than those of the frame
+        before decode all blocks once.
     field
         A second volume, of any grid, that ColorMap(by="field") colours surfaces by. It is read at
         its finest level, and takes up to half the memory.
@@ -147,12 +156,14 @@ class Renderer:
         bounds: bool = False,
         time_budget: bool = False,
         rays: bool = False,
+        labels: bool = False,
         surfaces: int = 0,
         field: Voxels | None = None,
         profiling: bool = False,
         quick: bool = False,
     ) -> None:
         can = {"levels": levels, "bounds": bounds, "time_budget": time_budget, "rays": rays}
+        can["labels"] = labels
         options = renderer_options(
             size, samples, memory_budget, cache_blocks, surfaces=surfaces, **can
         )
@@ -210,8 +221,9 @@ class Renderer:
     ) -> Camera:
         """A view from the front right and above in which the surfaces fill the picture."""
         value = self.volume._isovalue(isovalue_or_surfaces(isovalue, surfaces))
-        isovalues = Request(value, surfaces=surfaces).isovalues
-        return self._camera(isovalues, self.size if size is None else size_of(size))
+        request = Request(value, surfaces=surfaces)
+        self._check_labels(request)
+        return self._camera(request.values, self.size if size is None else size_of(size))
 
     def turntable(
         self,
@@ -223,11 +235,16 @@ class Renderer:
     ) -> list[Camera]:
         """Views once around the surfaces, as Volume.turntable()."""
         value = self.volume._isovalue(isovalue_or_surfaces(isovalue, surfaces))
-        isovalues = Request(value, surfaces=surfaces).isovalues
+        request = Request(value, surfaces=surfaces)
+        self._check_labels(request)
         width, height = self.size if size is None else size_of(size)
         self._check_turn()
-        count = view_count(num_views)
-        return [Camera(*camera) for camera in self._core.turntable(isovalues, count, width, height)]
+        cameras = self._core.turntable(request.values, view_count(num_views), width, height)
+        return [Camera(*camera) for camera in cameras]
+
+    def _check_labels(self, request: Request) -> None:
+        if request.has_labels and not self._can["labels"]:
+            raise _core.Error("labels needs a renderer that was made with labels=True")
 
     def _camera(self, isovalues: list[float], size: tuple[int, int]) -> Camera:
         self._check_turn()
@@ -369,7 +386,7 @@ class Renderer:
 
     def _completed(self, request: Request) -> Request:
         size = request.size or self.size
-        camera = request.camera or self._camera(request.isovalues, size)
+        camera = request.camera or self._camera(request.values, size)
         return replace(request, size=size, camera=camera)
 
     def cast_rays(

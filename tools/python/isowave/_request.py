@@ -25,7 +25,7 @@ from isowave._checked import (
 from isowave._clip import ClipPlane, clip_of
 from isowave._color_map import CheckedColorMap, ColorMap, color_map_for_core, color_map_of
 from isowave._slice import Slice, slice_map_for_core, slice_map_of, slices_of
-from isowave._surface import MAX_SURFACES, Color, Surface, color_of, surfaces_of
+from isowave._surface import MAX_SURFACES, Color, Surface, color_of, surface_for_core, surfaces_of
 
 ALL_OUTPUTS = ("rgb", "depth", "normals", "position")
 #: Weights of lights: from all around; of a headlight at the eye, and its highlight; from above it.
@@ -152,7 +152,10 @@ class Request:
         by_field = checked["color_map"] is not None and checked["color_map"].by != "axis"
         if self.color_map is not None and self.color is not None and not by_field:
             raise ValueError("color: the colour map colours surfaces")
-        value = number("isovalue", surfaces[0].isovalue if surfaces else self.isovalue)
+        if len({bool(surface.labels) for surface in surfaces}) == 2:
+            raise ValueError("surfaces of labels are drawn without isosurfaces: give all labels")
+        has_own = surfaces and not surfaces[0].labels
+        value = number("isovalue", surfaces[0].isovalue if has_own else self.isovalue)
         object.__setattr__(self, "isovalue", value)
         for name in ("background", "background_top"):
             if self.transparent and checked[name] is not None:
@@ -162,8 +165,17 @@ class Request:
 
     @property
     def isovalues(self) -> list[float]:
-        """Those of all surfaces."""
-        return [surface.isovalue for surface in self.surfaces] or [self.isovalue]
+        """Those of all surfaces; none of surfaces of labels."""
+        return [] if self.has_labels else self.values
+
+    @property
+    def values(self) -> list[float]:
+        """Isovalues of all surfaces, or their labels."""
+        return [value for each in self.surfaces for value in each.values] or [self.isovalue]
+
+    @property
+    def has_labels(self) -> bool:
+        return any(surface.labels for surface in self.surfaces)
 
     @property
     def num_surfaces(self) -> int:
@@ -194,6 +206,7 @@ class Request:
                 by_sample or self.voxel_pixels > 0,
             ),
             "time_budget": ("time_budget", self.time_budget is not None),
+            "labels": ("labels", self.has_labels),
             "rays": (
                 "ambient" if self.ambient else "shadow_rays",
                 self.ambient != 0 or self.shadow_rays != 0,
@@ -222,7 +235,7 @@ class Request:
             "normals": self.normals,
             "clip": [{"normal": plane.normal, "offset": plane.offset} for plane in self.clip],
             "caps": self.caps,
-            "surfaces": [vars(each) for each in self.surfaces],
+            "surfaces": [surface_for_core(each) for each in self.surfaces],
             "slices": [vars(each) for each in self.slices],
             **slice_map_for_core(slice_map_of(self.slice_map)),
             "voxel_pixels": self.voxel_pixels,

@@ -16,7 +16,7 @@ from isowave._image import Image
 from isowave._levels import Voxels
 from isowave._request import camera_for_core, camera_of, lights_of, optional_color
 from isowave._slice import Slice, slice_map_for_core, slice_map_of, slices_of
-from isowave._surface import Color, Surface, surfaces_of
+from isowave._surface import Color, Surface, surface_for_core, surfaces_of
 
 
 #: Fields of a Scene that are colours and lights, and arguments of Volume.render().
@@ -90,6 +90,19 @@ class Scene:
         more = Surface(self.volume._isovalue(isovalue), color, opacity, clipped)
         return replace(self, surfaces=(*self.surfaces, more))
 
+    def labels(
+        self,
+        labels: int | Sequence[int],
+        color: Color | None = None,
+        opacity: float = 1.0,
+        *,
+        clipped: bool = True,
+    ) -> Scene:
+        """The scene with one more surface, that of a label or of several; arguments as Surface."""
+        return replace(
+            self, surfaces=(*self.surfaces, Surface(None, color, opacity, clipped, labels))
+        )
+
     def slice(
         self,
         normal: str | Sequence[float],
@@ -131,7 +144,12 @@ class Scene:
             **{name: getattr(self, name) for name in LOOK},
         }
         first = self.surfaces[0] if len(self.surfaces) == 1 else None
-        if first is not None and first.opacity == 1 and first.clipped:
+        if (
+            first is not None
+            and first.opacity == 1
+            and first.clipped
+            and first.isovalue is not None
+        ):
             # One opaque surface is drawn with whatever Renderer.render() offers.
             arguments["isovalue"] = first.isovalue
             color_map = color_map_of(self.color_map)
@@ -182,7 +200,7 @@ def scene_fields(scene: Scene) -> dict[str, Any]:
     return {
         "field": "volume" if shows_volume else None,
         "camera": None if scene.view is None else camera_for_core(camera_of(scene.view)),
-        "surfaces": [vars(surface) for surface in surfaces_of(scene.surfaces)],
+        "surfaces": [surface_for_core(each) for each in surfaces_of(scene.surfaces)],
         "slices": [vars(each) for each in slices_of(scene.slices)],
         "clip": [vars(plane) for plane in clip_of(scene.planes)],
         "caps": scene.caps,

@@ -59,7 +59,13 @@ def open_scene(
     return Scene(
         volume,
         tuple(
-            Surface(each["isovalue"], vector(each["color"]), each["opacity"], each["clipped"])
+            Surface(
+                None if "labels" in each else each["isovalue"],
+                vector(each["color"]),
+                each["opacity"],
+                each["clipped"],
+                tuple(each.get("labels", ())),
+            )
             for each in fields["surfaces"]
         ),
         tuple(

@@ -106,7 +106,7 @@ class Volume(Voxels):
     ) -> Camera:
         """A view from the front right and above in which the surfaces fill the picture."""
         with self._lock:
-            renderer = self._renderer_for({"device": device})
+            renderer = self._renderer_for({"device": device, **labels_wanted(surfaces)})
             return renderer.camera(isovalue, size, surfaces=surfaces)
 
     def turntable(
@@ -124,7 +124,7 @@ class Volume(Voxels):
         of that size. The first view is from where camera() looks.
         """
         with self._lock:
-            renderer = self._renderer_for({"device": device})
+            renderer = self._renderer_for({"device": device, **labels_wanted(surfaces)})
             return renderer.turntable(num_views, isovalue, size, surfaces=surfaces)
 
     def scene(self) -> Scene:
@@ -179,6 +179,9 @@ class Volume(Voxels):
         field: Voxels | None = None,
     ) -> Image:
         """Draws a frame with a size, as render()."""
+        for option, argument in request.needs.items():
+            if request.has_labels and option != "labels":
+                raise _core.Error(f"labels are drawn without {argument}: leave out {argument}")
         wanted: dict[str, Any] = {"device": device, "memory_budget": memory_budget}
         wanted |= {"size": request.size, **dict.fromkeys(request.needs, True)}
         wanted["surfaces"] = request.num_surfaces
@@ -195,11 +198,14 @@ class Volume(Voxels):
     def _renderer_for(self, wanted: dict[str, Any]) -> Renderer:
         """The kept renderer, or a new one if the kept one lacks what is wanted."""
         made = self._made_with
+        # A renderer of labels draws nothing else.
+        draws_alike = bool(made.get("labels")) == bool(wanted.get("labels"))
         size = wanted.pop("size", (0, 0))
         samples = wanted.get("samples", 1)
         fits = (
             self._renderer is not None
             and size[0] * size[1] * samples**2 <= self._renderer.max_rays
+            and draws_alike
             and made.get("device") == wanted.get("device")
             and made.get("memory_budget") == wanted.get("memory_budget", made.get("memory_budget"))
             and made.get("field") is wanted.get("field", made.get("field"))
@@ -211,7 +217,7 @@ class Volume(Voxels):
             # The new one can do what the old one could, or two kinds of requests in turn would make
             # it anew each time.
             more = {
-                name: max(wanted.get(name, default), made.get(name, default))
+                name: max(wanted.get(name, default), made.get(name, default) if draws_alike else 0)
                 for name, default in CAPABILITIES.items()
             }
             self._made_with = {**wanted, **more}
@@ -225,7 +231,8 @@ class Volume(Voxels):
     def _make_renderer(self, largest: tuple[int, int], options: dict[str, Any]) -> Renderer:
         device = "" if options.get("device") is None else str(options["device"])
         if options.get("memory_budget") is None and _core.draws_on_host(device):
-            if options.get("field") is None and self._fits_host():
+            needs_device = options.get("field") is not None or options.get("labels")
+            if not needs_device and self._fits_host():
                 return self._host_renderer()  # which cast_rays() uses, too
         return Renderer(self, size=largest, quick=True, **options)
 
@@ -390,6 +397,12 @@ class Volume(Voxels):
     def view(self, **options: Any) -> Any:
         """Shows the volume in a notebook's widget or a browser's tab: isowave.view()."""
         return viewer.view(self, **options)
+
+
+def labels_wanted(surfaces: Sequence[Surface]) -> dict[str, Any]:
+    """What a renderer of these surfaces must be made with if they are those of labels."""
+    has_labels = Request(0.0, surfaces=surfaces).has_labels
+    return {"labels": True, "surfaces": len(surfaces)} if has_labels else {}
 
 
 def open_again(path: str, spacing: tuple[float, ...] | None) -> Volume:

@@ -18,7 +18,7 @@ from isowave._core import read_scene
 from isowave._scene_file import open_field
 
 from . import missing
-from .protocol import MAX_RAYS, first_line
+from .protocol import MAX_RAYS, NO_LABELS, first_line, has_labels
 
 
 def parse_bytes(text: str) -> int:
@@ -123,6 +123,8 @@ def scene_of(arguments: argparse.Namespace) -> dict[str, Any]:
     if arguments.isovalue is not None:
         raise ValueError("--scene has isovalues of its own: leave out --isovalue")
     fields = read_scene(arguments.scene)
+    if has_labels(fields):
+        raise ValueError(NO_LABELS)
     if arguments.volume is None and not fields["volume"]:
         raise ValueError(f"{arguments.scene} names no volume: give one")
     if fields["color_by_field"] and not (fields["field"] or arguments.field):

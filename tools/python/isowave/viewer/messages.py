@@ -13,7 +13,7 @@ from isowave._core import Error, parse_scene
 
 from .interfaces import ImageLike, VolumeLike
 from .pictures import Extent
-from .protocol import VERSION, first_line
+from .protocol import NO_LABELS, VERSION, first_line, has_labels
 from .renderers import Renderers
 from .turns import Frame, Stage
 
@@ -53,6 +53,8 @@ def scene(text: str) -> dict[str, Any]:
     """The fields of a scene file, or what is wrong with it."""
     try:
         fields = parse_scene(text)
+        if has_labels(fields):
+            raise Error(NO_LABELS)
     except Error as raised:
         return error(raised, None)
     return {"type": "scene", "fields": fields}

@@ -162,6 +162,15 @@ def check(content: object) -> Message:
     return read(content)
 
 
+#: Why a scene of labels is refused.
+NO_LABELS: Final = "the viewer draws no labels: isowave render --scene does"
+
+
+def has_labels(fields: dict[str, Any]) -> bool:
+    """Whether a scene file has surfaces of labels. fields: as _core.parse_scene() gives them."""
+    return any("labels" in surface for surface in fields["surfaces"])
+
+
 def first_line(error: Exception) -> str:
     """Text of an error, in one line of bounded length."""
     lines = str(error).strip().splitlines()
