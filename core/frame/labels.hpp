@@ -1,6 +1,15 @@
 #pragma once
-// Groups of a segmentation's labels: a surface of a frame may be that of a group
-// (kernels_cl/portable/label_table.h).
+// Groups of a segmentation's labels: a surface of a frame may be that of a group, of a field that
+// is 1 at voxels with one of its labels and 0 at the others, at 0.5.
+//
+// A renderer of labels has a table on its device, a byte for each label, with a bit for each of up
+// to eight groups (kernels_cl/portable/label_table.h). Voxels go through the table when blocks are
+// decoded. So a voxel of a cache slot is a mask of groups, and a slot holds the fields of all
+// groups in 64 bytes. field_of_slot() takes the bit of the group at work where kernels read slots,
+// and all behind it is as for isosurfaces. Ranges of blocks are the groups that all voxels are in,
+// and those that any voxel is in. A frame of other groups writes the table, has the ranges made
+// anew, which decodes all blocks once, and empties the cache. The kernels of such renderers are
+// built with ISO_LABELS; those of others do not change by it.
 
 #include <cstdint>
 #include <span>
