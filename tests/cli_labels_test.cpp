@@ -63,6 +63,10 @@ TEST_F(CliLabels, PicturesAreThoseOfIndicators) {
   EXPECT_THAT(text, HasSubstr("labels 3+300, view 0: "));
   render(in("both_25x24x23_uint8.raw") + " --surface 0.5,red -o " + in("b.png"));
   EXPECT_EQ(file("a.png"), file("b.png"));
+  const test::ProgramResult on_host = test::run_isowave(
+      "render " + seg + " --labels 3+300,red --size 48x36 --device host -o " + in("b.png"));
+  EXPECT_EQ(on_host.status, 0) << on_host.err;
+  EXPECT_EQ(file("a.png"), file("b.png"));
   const auto stats = nlohmann::json::parse(file("s.json"));
   EXPECT_EQ(stats["options"]["surfaces"][0]["labels"], (std::vector<int>{3, 300}));
   EXPECT_FALSE(stats["options"]["surfaces"][0].contains("isovalue"));
@@ -111,7 +115,6 @@ TEST_F(CliLabels, WhatLabelsAreDrawnWithoutIsRefused) {
         "--time-budget 9", "--slice z", "--reference", "--rate 8", "--light 1,0,0 --shadow 1"})
     refuse("--labels 3 " + std::string(option), "labels are drawn without it: leave it out");
   refuse("--labels 3 --color red", "--color: surfaces have colours of their own");
-  refuse("--labels 3 --device host", "--labels: the host has no such option");
   refuse("--labels 3 --pipeline blocks", "pipeline blocks draws no labels");
   refuse("--labels 3 --solver linear", "labels need --solver bernstein");
   const test::ProgramResult result = test::run_isowave(

@@ -325,11 +325,15 @@ TEST_P(LabelsOnDevice, CamerasAreThoseOfTheIndicator) {
   const SurfaceStyle surface = group({4, 256});
   DeviceRenderer ordinary(device_, scene.indicator_of(surface), {.size = kSize});
   const Camera expected = ordinary.camera(std::array{ISO_LABEL_ISOVALUE}),
-               got = renderer.camera(std::array{4.0f, 256.0f});
+               got = renderer.label_camera(surface.labels);
   EXPECT_EQ(got.eye, expected.eye);
   EXPECT_EQ(got.at, expected.at);
   EXPECT_THAT([&] { renderer.camera(std::array{0.5f}); },
-              ThrowsMessage<Error>(HasSubstr("0.5 is no label")));
+              ThrowsMessage<Error>(HasSubstr("draws labels alone")));
+  EXPECT_THAT([&] { ordinary.label_camera(surface.labels); },
+              ThrowsMessage<Error>(HasSubstr("draws no labels")));
+  HostRenderer host(scene.volume, {.largest = kSize});
+  EXPECT_EQ(host.label_camera(surface.labels).eye, got.eye);
 }
 
 TEST_P(LabelsOnDevice, WhatTheyCannotDoIsOneLine) {
@@ -358,8 +362,8 @@ TEST_P(LabelsOnDevice, WhatTheyCannotDoIsOneLine) {
   renderer.render(plain);
 
   DeviceRenderer ordinary(device_, scene.volume, {.size = kSize, .max_surfaces = 2});
-  HostRenderer host(scene.volume);
-  for (Renderer *other : {static_cast<Renderer *>(&ordinary), static_cast<Renderer *>(&host)})
+  TwinRenderer twin(scene.volume, kSize);
+  for (Renderer *other : {static_cast<Renderer *>(&ordinary), static_cast<Renderer *>(&twin)})
     EXPECT_THAT([&] { other->render(plain); }, ThrowsMessage<Error>(HasSubstr("draws no labels")));
 
   const auto cannot_open = [&](const CompressedVolume &volume, const RendererOptions &with,
@@ -384,6 +388,48 @@ TEST_P(LabelsOnDevice, WhatTheyCannotDoIsOneLine) {
   cannot_open(volume_of(65536, VoxelType::kInt32), options, "0 to 65536, are no labels");
   ArrayReader reader(scene.info, scene.voxels);
   cannot_open(compress(reader, {.rate = 8}), options, "with a loss");
+}
+
+TEST(LabelsOnTheHost, FramesOfOneGroupAreTheTwins) {
+  const Scene scene({41, 38, 45});
+  HostRenderer renderer(scene.volume);
+  for (const std::vector<std::uint16_t> &labels :
+       std::vector<std::vector<std::uint16_t>>{{3}, {300, 4}, {65535}, {0}, {9}}) {
+    SCOPED_TRACE(labels[0]);
+    FrameRequest request = scene.request({group(labels, 0.3f)}, {20, 15, 2});
+    expect_the_twins(renderer, scene, request);
+    request.clip.planes = {scene.through_middle()};
+    request.surfaces[0].opacity = 1;
+    expect_the_twins(renderer, scene, request);
+  }
+}
+
+/// Isosurfaces and labels in turn, also with the least memory.
+TEST_P(LabelsOnDevice, FramesOfTheHostAreTheSame) {
+  const Scene scene({41, 38, 45});
+  DeviceRenderer device(device_, scene.volume,
+                        {.size = kSize, .max_surfaces = 3, .with_labels = true});
+  FrameRequest request =
+      scene.request({group({3}, 0.3f), group({300, 9}), group({65535, 3}, 0.5f)});
+  const std::uint64_t least = HostLevels::least_bytes(scene.volume) +
+                              HostLevels::bytes_of_labels(scene.info, request.surfaces.size());
+  for (const std::uint64_t limit : {std::uint64_t{0}, least + (64u << 10)}) {
+    HostRenderer host(scene.volume, {.memory_limit = limit});
+    for (const int label : {3, 4, 3}) {
+      request.surfaces[0].labels = {static_cast<std::uint16_t>(label)};
+      const FrameStats expected = device.render(request), got = host.render(request);
+      EXPECT_EQ(got.layers.hits, expected.layers.hits);
+      expect_same_hits(host.hits(), device.hits(), kSize.width);
+      EXPECT_EQ(host.shade().pixels, device.shade().pixels);
+      FrameRequest plain = scene.request({});
+      plain.isovalue = 100;
+      host.render(plain);
+    }
+    EXPECT_LE(host.memory_bytes(), limit == 0 ? ~std::uint64_t{0} : limit);
+  }
+  HostRenderer little(scene.volume, {.memory_limit = HostLevels::least_bytes(scene.volume)});
+  EXPECT_THAT([&] { little.render(request); },
+              ThrowsMessage<Error>(HasSubstr("of memory at least")));
 }
 
 TEST(Labels, TablesHaveABitForEachSurface) {

@@ -97,13 +97,13 @@ std::string text_of_labels(const Surface &surface) {
   return text;
 }
 
-std::vector<double> values_of(const std::vector<Surface> &surfaces) {
-  std::vector<double> values;
+std::vector<std::uint16_t> labels_of(const std::vector<Surface> &surfaces) {
+  std::vector<std::uint16_t> labels;
   for (const Surface &surface : surfaces) {
-    if (surface.labels.empty()) values.push_back(surface.isovalue);
-    values.insert(values.end(), surface.labels.begin(), surface.labels.end());
+    const std::vector<std::uint16_t> more = core_style(surface).labels;
+    labels.insert(labels.end(), more.begin(), more.end());
   }
-  return values;
+  return labels;
 }
 
 core::ColorTable color_table_of(const std::string &map,

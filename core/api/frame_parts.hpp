@@ -23,8 +23,10 @@ core::Clip core_clip(const std::vector<ClipPlane> &planes, bool caps);
 core::SurfaceStyle core_style(const Surface &surface);
 /// The labels of a surface as `isowave render --labels` has them: 5+7-9.
 std::string text_of_labels(const Surface &surface);
-/// What core::Renderer::camera() takes: isovalues, or labels.
-std::vector<double> values_of(const std::vector<Surface> &surfaces);
+/// The labels of all surfaces.
+///
+/// Throws  core::Error: what is no label
+std::vector<std::uint16_t> labels_of(const std::vector<Surface> &surfaces);
 /// value_range  of the volume; infinite: not known
 /// Throws       core::Error: the range is needed, and not known; there is no such colour map
 core::Slices core_slices(const std::vector<Slice> &slices, const Appearance &appearance,

@@ -19,7 +19,6 @@ using core::ocl::DrawsOn;
 /// The option that the host has no meaning for; null: none was given.
 const char *option_of_devices(const RendererOptions &options, const DeviceOptions &device_options) {
   if (options.cache_blocks != 0) return "cache_blocks";
-  if (options.with_labels) return "with_labels";
   return device_options.profiling ? "profiling" : nullptr;
 }
 

@@ -37,7 +37,6 @@ Renderer make_quick_renderer(std::shared_ptr<Device> device, std::shared_ptr<con
                              const HostRendererOptions &host_options) {
   return core::guarded("making a renderer", [&] {
     check_there(device, volume);
-    if (options.with_labels) return Renderer(std::move(device), std::move(volume), options);
     Device::Implementation &on = device->implementation();
     const core::CompressedVolume &compressed = volume->implementation().volume;
     core::make_plan(

@@ -144,30 +144,24 @@ Frame Renderer::Implementation::cast_rays(std::span<const Ray> rays, double isov
   });
 }
 
-std::vector<Camera> Renderer::Implementation::turntable(std::span<const double> isovalues,
+std::vector<Camera> Renderer::Implementation::turntable(const std::vector<Surface> &surfaces,
                                                         std::uint32_t num_views,
                                                         std::optional<ImageSize> size) {
   return guarded("looking for the surface", [&] {
     if (num_views == 0 || num_views > core::kMostViews)
       throw core::Error("a turntable of {} views: give 1 to {}", num_views, core::kMostViews);
     const std::lock_guard lock(*turns_);
+    const auto of = size ? std::optional(core_size(*size)) : std::nullopt;
+    std::vector<double> isovalues(surfaces.size());
+    std::ranges::transform(surfaces, isovalues.begin(), &Surface::isovalue);
+    const std::vector<std::uint16_t> labels = labels_of(surfaces);
     const core::Camera first =
-        renderer_->camera(core::drawn_isovalues(volume_, isovalues),
-                          size ? std::optional(core_size(*size)) : std::nullopt, num_views);
+        labels.empty() ? renderer_->camera(core::drawn_isovalues(volume_, isovalues), of, num_views)
+                       : renderer_->label_camera(labels, of, num_views);
     std::vector<Camera> cameras(num_views);
     std::ranges::transform(core::turntable(first, num_views), cameras.begin(), public_camera);
     return cameras;
   });
-}
-
-std::vector<Camera> Renderer::Implementation::turntable(const std::vector<Surface> &surfaces,
-                                                        std::uint32_t num_views,
-                                                        std::optional<ImageSize> size) {
-  const bool has_labels =
-      std::ranges::any_of(surfaces, [](const Surface &surface) { return !surface.labels.empty(); });
-  if (has_labels && !renderer_->abilities().labels)
-    throw Error("this renderer draws no labels: make it with_labels, on a device");
-  return turntable(std::span<const double>(values_of(surfaces)), num_views, size);
 }
 
 bool Renderer::Implementation::can_draw(const FrameRequest &request) const {
@@ -204,7 +198,7 @@ Frame Renderer::cast_rays(std::span<const Ray> rays, double isovalue, Normals no
   return implementation_->cast_rays(rays, isovalue, normals);
 }
 Camera Renderer::camera(double isovalue, std::optional<ImageSize> size) {
-  return implementation_->turntable({&isovalue, 1}, 1, size).front();
+  return implementation_->turntable({{.isovalue = isovalue}}, 1, size).front();
 }
 Camera Renderer::camera(const std::vector<Surface> &surfaces, std::optional<ImageSize> size) {
   return turntable(surfaces, 1, size).front();

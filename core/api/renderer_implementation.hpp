@@ -38,8 +38,6 @@ struct Renderer::Implementation {
 
   Frame render(const FrameRequest &request);
   Frame cast_rays(std::span<const Ray> rays, double isovalue, Normals normals);
-  std::vector<Camera> turntable(std::span<const double> isovalues, std::uint32_t num_views,
-                                std::optional<ImageSize> size);
   std::vector<Camera> turntable(const std::vector<Surface> &surfaces, std::uint32_t num_views,
                                 std::optional<ImageSize> size);
   bool can_draw(const FrameRequest &request) const;

@@ -1,21 +1,8 @@
 #include "core/frame/labels.hpp"
 
-#include <cmath>
-
 #include "core/base/error.hpp"
 
 namespace isowave::core {
-
-std::vector<std::uint16_t> labels_of(std::span<const float> values) {
-  std::vector<std::uint16_t> labels;
-  labels.reserve(values.size());
-  for (const float value : values) {
-    if (!(value >= 0 && value < float{ISO_NUM_LABELS} && value == std::floor(value)))
-      throw Error("{} is no label: labels are whole numbers, 0 to {}", value, ISO_NUM_LABELS - 1);
-    labels.push_back(static_cast<std::uint16_t>(value));
-  }
-  return labels;
-}
 
 LabelTable label_table(const std::vector<SurfaceStyle> &surfaces) {
   LabelTable table(ISO_NUM_LABELS);

@@ -12,7 +12,6 @@
 // built with ISO_LABELS; those of others do not change by it.
 
 #include <cstdint>
-#include <span>
 #include <vector>
 
 #include "core/frame/surfaces.hpp"
@@ -23,9 +22,6 @@ namespace isowave::core {
 
 /// A byte for each label, [ISO_NUM_LABELS]: bit i if surface i has the label.
 using LabelTable = std::vector<std::uint8_t>;
-
-/// Throws  Error: a value is no label
-std::vector<std::uint16_t> labels_of(std::span<const float> values);
 
 LabelTable label_table(const std::vector<SurfaceStyle> &surfaces);
 

@@ -11,6 +11,10 @@ namespace isowave::core {
 
 namespace {
 
+constexpr const char *kDrawsNoLabels =
+    "this renderer draws no labels: draw on the host, or on a device by a renderer that was made "
+    "with_labels";
+
 /// Checks settings that either the renderer or the user may choose, not both.
 void check_choices(const FrameRequest &request) {
   if (!request.clip.planes.empty() && request.bound != FieldBound::kNone)
@@ -110,10 +114,8 @@ void check(const FrameRequest &request, const Abilities &abilities) {
                           : fmt::format("this renderer was made for {} surfaces, and {} are given",
                                         abilities.most_surfaces, request.surfaces.size()));
   const bool has_labels = !request.surfaces.empty() && !request.surfaces.front().labels.empty();
-  need(has_labels, abilities.labels,
-       "this renderer draws no labels: draw on a device by a renderer that was made with_labels");
-  need(abilities.labels && !has_labels, false,
-       "this renderer draws labels alone: give each surface labels");
+  need(has_labels, abilities.labels, kDrawsNoLabels);
+  need(!has_labels, abilities.isosurfaces, kDrawsLabelsAlone);
   need(request.voxel_pixels > 0, abilities.levels,
        "this renderer draws the finest level of detail alone: leave out voxel_pixels, or draw a "
        "volume with levels on the host, or on a device by a renderer that was made with_levels");
@@ -149,6 +151,11 @@ Shading Renderer::shading_of(const VolumeInfo &info, const Appearance &appearanc
     throw Error("the last frame has no values of a field: ask for field_values");
   const bool needs_range = by && !(by->low && by->high);
   return make_shading(info, appearance, needs_range ? field_range() : std::nullopt);
+}
+
+Camera Renderer::label_camera(std::span<const std::uint16_t>, std::optional<ImageSize>,
+                              std::uint32_t) {
+  throw Error("{}", kDrawsNoLabels);
 }
 
 void Renderer::keep_picture() {

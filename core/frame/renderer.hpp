@@ -37,9 +37,14 @@ struct Abilities {
   bool clipping = false;           ///< FrameRequest::clip
   bool field = false;              ///< FrameRequest::field_values
   std::size_t most_surfaces = 0;   ///< of FrameRequest::surfaces
-  bool labels = false;             ///< surfaces of labels, and no others
+  bool labels = false;             ///< surfaces of labels
+  bool isosurfaces = true;         ///< false: surfaces of labels alone
   Solver solver = kDefaultSolver;  ///< the root finder
 };
+
+/// Why a renderer without Abilities::isosurfaces refuses.
+inline constexpr const char *kDrawsLabelsAlone =
+    "this renderer draws labels alone: give each surface labels";
 
 /// Throws  Error: the request is out of range, or asks for an ability that the renderer lacks
 void check(const FrameRequest &request, const Abilities &abilities);
@@ -88,6 +93,12 @@ class Renderer {
   /// Throws     Error: an isovalue is NaN
   virtual Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {},
                         std::uint32_t num_views = 1) = 0;
+
+  /// The same for the surface of labels.
+  ///
+  /// Throws  Error: no ability for labels
+  virtual Camera label_camera(std::span<const std::uint16_t> labels,
+                              std::optional<ImageSize> size = {}, std::uint32_t num_views = 1);
 
   // These functions return the last frame, or within on_pass the frame at work. Rank 0 of a team
   // gets the frame, and other ranks get empty ones. All of them wait, and throw Error if no frame
@@ -162,6 +173,10 @@ class RendererAround : public Renderer {
   Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {},
                 std::uint32_t num_views = 1) override {
     return inner().camera(isovalues, size, num_views);
+  }
+  Camera label_camera(std::span<const std::uint16_t> labels, std::optional<ImageSize> size = {},
+                      std::uint32_t num_views = 1) override {
+    return inner().label_camera(labels, size, num_views);
   }
   ImageSize size() const override { return inner().size(); }
   FrameArrays fetch(const WantedArrays &wanted, const Appearance &appearance) override {

@@ -106,6 +106,11 @@ Camera SoonRenderer::camera(std::span<const float> isovalues, std::optional<Imag
   return find_any().camera(isovalues, size.value_or(parts_.abilities.largest), num_views);
 }
 
+Camera SoonRenderer::label_camera(std::span<const std::uint16_t> labels,
+                                  std::optional<ImageSize> size, std::uint32_t num_views) {
+  return find_any().label_camera(labels, size.value_or(parts_.abilities.largest), num_views);
+}
+
 void SoonRenderer::clear_cache() {
   if (meanwhile_) meanwhile_->clear_cache();
   if (is_ready_) wait_for_ready().clear_cache();

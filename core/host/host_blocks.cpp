@@ -5,6 +5,7 @@
 #include <bit>
 #include <limits>
 #include <mutex>
+#include <utility>
 
 #include "core/base/parallel_for.hpp"
 #include "core/platform/memory.hpp"
@@ -12,6 +13,7 @@
 #include "core/volume/range_thresholds.hpp"
 #include "kernels_cl/portable/block_bound.h"
 #include "kernels_cl/portable/block_cells.h"
+#include "kernels_cl/portable/label_table.h"
 
 namespace isowave::core {
 
@@ -114,7 +116,8 @@ HostBlocks::HostBlocks(const CompressedVolume &volume, std::unique_ptr<HostRoom>
   own_room_ = std::move(room);
 }
 
-HostBlocks::HostBlocks(const CompressedVolume &volume, HostRoom &room, std::uint32_t num_threads)
+HostBlocks::HostBlocks(const CompressedVolume &volume, HostRoom &room, std::uint32_t num_threads,
+                       std::vector<std::uint8_t> labels)
     : volume_(&volume),
       room_(&room),
       num_threads_(num_threads),
@@ -123,7 +126,8 @@ HostBlocks::HostBlocks(const CompressedVolume &volume, HostRoom &room, std::uint
       num_macrocells_(num_macrocells(make_grid(volume.info))),
       values_(volume.block_count() * ISO_BLOCK_VOXELS * sizeof(float)),
       decoded_(volume.block_count()),
-      decoded_as_(volume) {
+      decoded_as_(volume),
+      labels_(std::move(labels)) {
   selections_.push_back(std::make_unique<Selection>(*this));
   find_ranges();
   room.hold(bytes(volume.info));
@@ -172,6 +176,41 @@ void HostBlocks::find_ranges() {
   thresholds_ = range_thresholds(std::move(sampled));
 }
 
+void HostBlocks::show_labels(const std::vector<std::uint8_t> &labels) {
+  if (labels == labels_) return;
+  labels_ = labels;
+  for (const auto &selection : selections_) selection->isovalue.reset();
+  forget();
+  find_ranges();
+}
+
+/// Voxels of a block, as the group's field has them.
+void HostBlocks::to_group(float *values) const {
+  for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v)
+    values[v] = is_label(values[v]) ? static_cast<float>(labels_[static_cast<uint>(values[v])]) : 0;
+}
+
+/// As HostLoops::ranges().
+void HostBlocks::ranges_of_labels(const EncodedBlock &block, BlockRange *parts) const {
+  alignas(64) std::array<float, ISO_BLOCK_VOXELS> values;
+  host_loops().decode(block, values.data());
+  to_group(values.data());
+  for (uint part = 0; part < 8; ++part) {
+    const uint end_x = (part & 1) != 0 ? 1 : block.size_x,
+               end_y = (part & 2) != 0 ? 1 : block.size_y,
+               end_z = (part & 4) != 0 ? 1 : block.size_z;
+    parts[part] = {1, 0};
+    for (uint z = 0; z < end_z; ++z) {
+      for (uint y = 0; y < end_y; ++y) {
+        for (uint x = 0; x < end_x; ++x) {
+          const float value = values[x + 4 * y + 16 * z];
+          add(parts[part], {value, value});
+        }
+      }
+    }
+  }
+}
+
 /// Writes the value ranges of the eight parts of each block of layer z.
 ///
 /// ranges   [block][8]
@@ -201,7 +240,11 @@ void HostBlocks::ranges_of_layer(std::uint32_t z, std::span<BlockRange> ranges,
           if (volume_->file) bits.words = words.data();
           bits.first_bit -= begin_bit;
           BlockRange *parts = ranges.data() + 8 * (block - layer);
-          host_loops().ranges(bits, parts);
+          if (labels_.empty()) {
+            host_loops().ranges(bits, parts);
+          } else {
+            ranges_of_labels(bits, parts);
+          }
           const std::uint64_t number = block / sample.stride;
           if (number >= sample.count ||
               sampled_block(static_cast<uint>(number * sample.stride), sample.stride) != block)
@@ -464,6 +507,7 @@ void HostBlocks::decode_to(std::size_t block, float *values) const {
     bits.first_bit = 0;
   }
   host_loops().decode(bits, values);
+  if (!labels_.empty()) to_group(values);
   if (decoded_as_.uniform == 0) return;
   const ValueOffset offset{decoded_as_.uniform, decoded_as_.unit};
   for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v)

@@ -63,8 +63,20 @@ class HostBlocks {
   /// Throws        Error: a file that the volume is in has become shorter, or cannot be read
   HostBlocks(const CompressedVolume &volume, std::uint64_t memory_limit, std::uint32_t num_threads);
   HostBlocks(CompressedVolume &&, std::uint64_t, std::uint32_t) = delete;
-  /// The same within memory that others share. room: must outlive this
-  HostBlocks(const CompressedVolume &volume, HostRoom &room, std::uint32_t num_threads);
+  /// The same within memory that others share.
+  ///
+  /// room    must outlive this
+  /// labels  as show_labels(); empty: the field is the volume's
+  HostBlocks(const CompressedVolume &volume, HostRoom &room, std::uint32_t num_threads,
+             std::vector<std::uint8_t> labels = {});
+
+  /// Shows the field of another group of labels, of a volume that was made with one: it is 1 at
+  /// voxels with a label of the group, and 0 at the others. Decodes all blocks once, for the
+  /// ranges, unless the group is in use.
+  ///
+  /// labels  [ISO_NUM_LABELS] 1: the label is in the group; else 0
+  /// Throws  Error: as the constructor
+  void show_labels(const std::vector<std::uint8_t> &labels);
 
   /// Has blocks decoded to these values, and forgets those of others. Before: all planes.
   void decode_as(const HostValues &values);
@@ -157,6 +169,8 @@ class HostBlocks {
   bool may_hold(float low, float high, std::uint32_t bound_code, float isovalue) const;
   std::uint32_t dual_grid_code(const glm::uvec3 &block) const;
   void find_ranges();
+  void to_group(float *values) const;
+  void ranges_of_labels(const EncodedBlock &block, BlockRange *parts) const;
   void ranges_of_layer(std::uint32_t z, std::span<BlockRange> ranges,
                        std::span<float> sampled) const;
   void set_dual_ranges(std::uint32_t z, std::span<const BlockRange> layer,
@@ -183,6 +197,7 @@ class HostBlocks {
   std::vector<std::atomic<uchar>> decoded_;
   std::atomic<std::uint64_t> num_decoded_ = 0;
   HostValues decoded_as_;
+  std::vector<std::uint8_t> labels_;  ///< of show_labels(); empty: the field is the volume's
   std::vector<std::unique_ptr<Selection>> selections_;  ///< one or more
 };
 

@@ -1,7 +1,10 @@
 #include "core/host/host_levels.hpp"
 
+#include <utility>
+
 #include "core/view/detail.hpp"
 #include "core/zfp/stated_errors.hpp"
+#include "kernels_cl/portable/label_table.h"
 
 namespace isowave::core {
 
@@ -64,6 +67,39 @@ std::vector<HostLevel> HostLevels::open_surfaces(const FrameParams &frame,
   return surfaces;
 }
 
+/// The finest level, with the field of these labels.
+HostBlocks &HostLevels::blocks_of_labels(std::size_t group, std::span<const std::uint16_t> labels) {
+  std::vector<std::uint8_t> of_group(ISO_NUM_LABELS);
+  for (const std::uint16_t label : labels) of_group[label] = 1;
+  if (group == label_blocks_.size()) {
+    label_blocks_.push_back(
+        std::make_unique<HostBlocks>(*volumes_[0], room_, num_threads_, std::move(of_group)));
+  } else {
+    label_blocks_[group]->show_labels(of_group);
+  }
+  label_blocks_[group]->select(ISO_LABEL_ISOVALUE);
+  return *label_blocks_[group];
+}
+
+std::vector<HostLevel> HostLevels::open_labels(const FrameParams &frame,
+                                               std::span<const std::vector<std::uint16_t>> groups) {
+  std::vector<HostLevel> surfaces;
+  for (std::size_t i = 0; i < groups.size(); ++i) {
+    HostBlocks &blocks = blocks_of_labels(i, groups[i]);
+    surfaces.push_back({frame, blocks.field()});
+    surfaces.back().frame.surface = blocks.surface();
+    surfaces.back().frame.screen = make_screen_box(surfaces.back().frame);
+  }
+  return surfaces;
+}
+
+std::optional<BlockBox> HostLevels::label_box(std::span<const std::uint16_t> labels) {
+  const Surface &surface = blocks_of_labels(0, labels).surface();
+  if (surface.active_end_x == 0) return {};
+  return BlockBox{{surface.active_begin_x, surface.active_begin_y, surface.active_begin_z},
+                  {surface.active_end_x, surface.active_end_y, surface.active_end_z}};
+}
+
 HostBlocks &HostLevels::open_finest(float isovalue) {
   HostBlocks &blocks = blocks_of(0);
   blocks.decode_as(HostValues(*volumes_[0]));
@@ -75,11 +111,13 @@ void HostLevels::forget() {
   for (const auto &blocks : blocks_) {
     if (blocks) blocks->forget();
   }
+  for (const auto &blocks : label_blocks_) blocks->forget();
 }
 
 std::uint64_t HostLevels::num_decoded() const {
   std::uint64_t sum = 0;
   for (const auto &blocks : blocks_) sum += blocks ? blocks->num_decoded() : 0;
+  for (const auto &blocks : label_blocks_) sum += blocks->num_decoded();
   return sum;
 }
 

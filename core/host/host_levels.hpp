@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -49,6 +50,21 @@ class HostLevels {
   /// Throws   Error: as HostBlocks
   std::vector<HostLevel> open_surfaces(const FrameParams &frame, std::span<const float> isovalues,
                                        double voxel_error);
+  /// Memory of that many groups of labels, beside least_bytes().
+  static std::uint64_t bytes_of_labels(const VolumeInfo &info, std::size_t num_groups) {
+    return num_groups * HostBlocks::bytes(info);
+  }
+  /// Prepares the finest level for a frame of surfaces of labels. Groups that are not those of the
+  /// frame before have all blocks decoded once each.
+  ///
+  /// frame   of the finest level
+  /// groups  one or more lists of labels
+  /// Returns  [group] as open_surfaces()
+  /// Throws   Error: as HostBlocks
+  std::vector<HostLevel> open_labels(const FrameParams &frame,
+                                     std::span<const std::vector<std::uint16_t>> groups);
+  /// The box around the blocks that the surface of labels is in; none if there is no such block.
+  std::optional<BlockBox> label_box(std::span<const std::uint16_t> labels);
   /// Prepares the finest level for rays of any origin: its field is that of all bit planes.
   HostBlocks &open_finest(float isovalue);
 
@@ -60,12 +76,14 @@ class HostLevels {
 
  private:
   HostBlocks &blocks_of(std::size_t level);
+  HostBlocks &blocks_of_labels(std::size_t group, std::span<const std::uint16_t> labels);
 
   std::vector<const CompressedVolume *> volumes_;
   std::vector<VolumeInfo> infos_;
   std::uint32_t num_threads_;
   HostRoom room_;
-  std::vector<std::unique_ptr<HostBlocks>> blocks_;  ///< [level] null: not made yet
+  std::vector<std::unique_ptr<HostBlocks>> blocks_;        ///< [level] null: not made yet
+  std::vector<std::unique_ptr<HostBlocks>> label_blocks_;  ///< [group] of the finest level
 };
 
 }  // namespace isowave::core

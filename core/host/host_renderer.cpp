@@ -12,6 +12,7 @@
 #include "core/base/parallel_for.hpp"
 #include "core/frame/ambient_rays.hpp"
 #include "core/frame/field_values.hpp"
+#include "core/frame/labels.hpp"
 #include "core/frame/surface_camera.hpp"
 #include "core/platform/memory.hpp"
 #include "core/view/detail.hpp"
@@ -101,6 +102,7 @@ Abilities HostRenderer::abilities_of(const CompressedVolume &volume) {
   abilities.clipping = abilities.fewer_planes = abilities.bounds = abilities.given_rays =
       abilities.kept_picture = true;
   abilities.most_surfaces = ISO_MAX_SURFACES;
+  abilities.labels = true;
   return abilities;
 }
 
@@ -164,11 +166,28 @@ void HostRenderer::draw_one(const FrameRequest &request, std::span<const FramePa
   });
 }
 
+/// The surfaces of a frame, in that order.
+std::vector<HostLevel> HostRenderer::open_surfaces(const FrameRequest &request,
+                                                   const FrameParams &frame,
+                                                   std::span<const std::uint32_t> order) {
+  if (!request.surfaces.front().labels.empty()) {
+    check_labels(volume_);
+    checked_limit(volume_, memory_limit_, 1,
+                  HostLevels::bytes_of_labels(info_, request.surfaces.size()));
+    std::vector<std::vector<std::uint16_t>> groups;
+    for (const std::uint32_t number : order) groups.push_back(request.surfaces[number].labels);
+    return levels_.open_labels(frame, groups);
+  }
+  checked_limit(volume_, memory_limit_, request.surfaces.size());
+  std::vector<float> isovalues;
+  for (const std::uint32_t number : order) isovalues.push_back(request.surfaces[number].isovalue);
+  return levels_.open_surfaces(frame, isovalues, request.voxel_error);
+}
+
 /// Several or translucent surfaces: in each tile, first hits on each of them, and then their
 /// layers.
 void HostRenderer::draw_surfaces(const FrameRequest &request, const FrameParams &frame,
                                  ImageSize size, FrameStats &stats) {
-  checked_limit(volume_, memory_limit_, request.surfaces.size());
   LayerBlend by{
       make_shading(info_, request.light),
       make_layer_params(request.surfaces, request.slices, info_, frame.view, request.camera),
@@ -190,10 +209,7 @@ void HostRenderer::draw_surfaces(const FrameRequest &request, const FrameParams 
     if (request.surfaces[by.numbers[k]].opacity == 1) by.opaque.push_back(k);
   }
   by.slice_map.first_surface = by.colors.num_surfaces;
-  std::vector<float> isovalues;
-  for (const std::uint32_t number : by.numbers)
-    isovalues.push_back(request.surfaces[number].isovalue);
-  std::vector<HostLevel> surfaces = levels_.open_surfaces(frame, isovalues, request.voxel_error);
+  std::vector<HostLevel> surfaces = open_surfaces(request, frame, by.numbers);
   for (std::size_t k = 0; k < surfaces.size(); ++k) {
     if (request.surfaces[by.numbers[k]].clipped)
       clip_levels({&surfaces[k], 1}, by.clip, frame.screen);
@@ -396,6 +412,15 @@ Camera HostRenderer::camera(std::span<const float> isovalues, std::optional<Imag
     box->end = glm::max(box->end, blocks->end);
   }
   return surface_camera(info_, box, of_picture, num_views);
+}
+
+Camera HostRenderer::label_camera(std::span<const std::uint16_t> labels,
+                                  std::optional<ImageSize> size, std::uint32_t num_views) {
+  const ImageSize of_picture = size.value_or(abilities().largest);
+  check_image_size(of_picture);
+  check_labels(volume_);
+  checked_limit(volume_, memory_limit_, 1, HostLevels::bytes_of_labels(info_, 1));
+  return surface_camera(info_, levels_.label_box(labels), of_picture, num_views);
 }
 
 void HostRenderer::keep_picture() {

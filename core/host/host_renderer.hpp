@@ -56,6 +56,9 @@ class HostRenderer : public Renderer {
   Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {},
                 std::uint32_t num_views = 1) override;
 
+  Camera label_camera(std::span<const std::uint16_t> labels, std::optional<ImageSize> size = {},
+                      std::uint32_t num_views = 1) override;
+
   ImageSize size() const override { return size_; }
   std::vector<HitRecord> hits() override;
   bool has_field_values() const override { return !field_values_.empty(); }
@@ -87,6 +90,8 @@ class HostRenderer : public Renderer {
                     Draw draw);
   void draw_one(const FrameRequest &request, std::span<const FrameParams> frames, ImageSize size,
                 FrameStats &stats);
+  std::vector<HostLevel> open_surfaces(const FrameRequest &request, const FrameParams &frame,
+                                       std::span<const std::uint32_t> order);
   void draw_surfaces(const FrameRequest &request, const FrameParams &frame, ImageSize size,
                      FrameStats &stats);
   std::uint64_t trace(std::span<const HostLevel> drawing, const RayTile &tile, bool is_alone,

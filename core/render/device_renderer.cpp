@@ -249,6 +249,7 @@ Abilities DeviceRenderer::abilities_of(const RendererOptions &options) {
   abilities.bounds = options.with_bounds;
   abilities.most_surfaces = options.max_surfaces;
   abilities.labels = options.with_labels;
+  abilities.isosurfaces = !options.with_labels;
   abilities.given_rays = options.with_given_rays;
   abilities.kept_picture = options.with_kept_picture;
   abilities.solver = options.solver;
@@ -350,13 +351,9 @@ std::vector<DecodedValues> DeviceRenderer::decoded_values(const FrameRequest &re
 }
 
 std::optional<BlockBox> DeviceRenderer::surface_box(std::span<const float> isovalues) {
+  if (options_.with_labels) throw Error("{}", kDrawsLabelsAlone);
   Level &finest = blocks_.levels[0];
   finest.macrocells.use(static_cast<std::size_t>(FieldBound::kNone));
-  if (options_.with_labels) {
-    choose_labels({{.labels = labels_of(isovalues)}});
-    return isowave::core::surface_box(finest.macrocells, finest.info,
-                                      std::array{ISO_LABEL_ISOVALUE});
-  }
   return isowave::core::surface_box(finest.macrocells, finest.info, isovalues);
 }
 
@@ -364,6 +361,18 @@ Camera DeviceRenderer::camera(std::span<const float> isovalues, std::optional<Im
                               std::uint32_t num_views) {
   return surface_camera(blocks_.levels[0].info, surface_box(isovalues),
                         size.value_or(options_.size), num_views);
+}
+
+Camera DeviceRenderer::label_camera(std::span<const std::uint16_t> labels,
+                                    std::optional<ImageSize> size, std::uint32_t num_views) {
+  if (!options_.with_labels) return Renderer::label_camera(labels, size, num_views);
+  choose_labels({{.labels = {labels.begin(), labels.end()}}});
+  Level &finest = blocks_.levels[0];
+  finest.macrocells.use(0);  // the group's
+  return surface_camera(
+      finest.info,
+      isowave::core::surface_box(finest.macrocells, finest.info, std::array{ISO_LABEL_ISOVALUE}),
+      size.value_or(options_.size), num_views);
 }
 
 std::vector<HitRecord> DeviceRenderer::cast_rays(std::span<const WorldRay> world_rays,

@@ -59,13 +59,14 @@ class DeviceRenderer : public Renderer {
 
   /// The box around the blocks that isosurfaces may be in; none if they are in no block.
   ///
-  /// isovalues  of a renderer of labels: labels, of whose surface the blocks are
-  /// Throws     Error: an isovalue is NaN, or no label
-  /// Waits      yes
+  /// Throws  Error: an isovalue is NaN; a renderer of labels
+  /// Waits   yes
   std::optional<BlockBox> surface_box(std::span<const float> isovalues);
 
   Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {},
                 std::uint32_t num_views = 1) override;
+  Camera label_camera(std::span<const std::uint16_t> labels, std::optional<ImageSize> size = {},
+                      std::uint32_t num_views = 1) override;
   std::vector<HitRecord> cast_rays(std::span<const WorldRay> rays, float isovalue,
                                    Normals normals) override;
 

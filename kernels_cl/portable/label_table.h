@@ -11,14 +11,18 @@ ISO_NAMESPACE_BEGIN
 #define ISO_NUM_LABELS 65536u
 #define ISO_LABEL_ISOVALUE 0.5f  ///< of each group's surface in its field
 
-/// The groups of a voxel's label, a bit for each. Broken files may have voxels that are no labels:
-/// they are in no group.
+/// Is a voxel's value a label? That of a broken file may be none.
+ISO_INLINE int is_label(float value) {
+  return value >= 0.0f && value < (float)ISO_NUM_LABELS;
+}
+
+/// The groups of a voxel's label, a bit for each; none if the value is no label.
 ///
 /// table  [ISO_NUM_LABELS / 4] four labels a word
 /// value  of the voxel
 ISO_INLINE uint groups_of_label(ISO_GLOBAL const uint *table, float value) {
   uint label;
-  if (!(value >= 0.0f && value < (float)ISO_NUM_LABELS)) return 0;
+  if (!is_label(value)) return 0;
   label = (uint)value;
   return table[label >> 2] >> 8u * (label & 3u) & 0xFFu;
 }

@@ -73,7 +73,7 @@ void add_labels_option(CLI::App &command, std::vector<std::string> &texts) {
                   "labels of a segmentation, 0 to 65535, with +, and - for ranges (5+7-9), whose "
                   "surface is drawn together, and its colour and opacity as --surface has them; "
                   "repeat it for up to 8 surfaces in one picture. Voxels are integers, compressed "
-                  "without a loss, and an OpenCL device draws")
+                  "without a loss")
       ->type_name("LABELS[,COLOR[,OPACITY[,whole]]]")
       ->allow_extra_args(false);
 }

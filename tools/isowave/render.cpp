@@ -362,12 +362,14 @@ void set_up(const CLI::App &command, RenderArgs &options, Drawing &drawing) {
   if (compiling) compiling->finish();
   const bool fits_surface = options.frame.orbit == 0 && !drawing.views.file;
   if (fits_surface) {
-    const auto isovalues =
-        drawn_isovalues(drawing.volume(), options.surfaces.empty() ? options.frame.isovalues
-                                                                   : values_of(options.surfaces));
     const std::uint32_t num_views = drawing.views.count;
-    drawing.cameras = turntable(
-        drawing.renderer->core().camera(isovalues, drawing.views.size, num_views), num_views);
+    Renderer &renderer = drawing.renderer->core();
+    const Camera first =
+        has_labels(options.surfaces)
+            ? renderer.label_camera(labels_of(options.surfaces), drawing.views.size, num_views)
+            : renderer.camera(drawn_isovalues(drawing.volume(), all_isovalues(options)),
+                              drawing.views.size, num_views);
+    drawing.cameras = turntable(first, num_views);
   }
   if (options.parallel)
     std::ranges::transform(drawing.cameras, drawing.cameras.begin(), in_parallel);

@@ -43,8 +43,7 @@ void set_wanted(RenderArgs &options) {
 void choose_drawing(const CLI::App &command, const RenderArgs &options, Drawing &drawing) {
   if (options.reference || drawing.is_team()) return;
   drawing.draws_on = ocl::choose_drawing(options.device);
-  const std::string option =
-      has_labels(options.surfaces) ? "--labels" : find_device_option(command);
+  const std::string option = find_device_option(command);
   if (option.empty() || !drawing.on_host()) return;
   if (drawing.draws_on == ocl::DrawsOn::kHost)
     throw Error("{}: the host has no such option: leave it out, or name a device", option);

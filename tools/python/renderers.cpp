@@ -363,19 +363,27 @@ class PyRenderer {
         true);
   }
 
-  nb::tuple camera(const std::vector<double> &isovalues, std::uint32_t width,
-                   std::uint32_t height) {
-    std::vector<isowave::Surface> surfaces;
-    for (const double isovalue : isovalues) surfaces.push_back({.isovalue = isovalue});
+  /// Surfaces of isovalues, or the surface of labels.
+  static std::vector<isowave::Surface> surfaces_of(const std::vector<double> &values, bool labels) {
+    std::vector<isowave::Surface> surfaces(labels ? 1 : 0);
+    for (const double value : values) {
+      if (labels) surfaces[0].labels.push_back(static_cast<std::uint32_t>(value));
+      if (!labels) surfaces.push_back({.isovalue = value});
+    }
+    return surfaces;
+  }
+
+  nb::tuple camera(const std::vector<double> &values, std::uint32_t width, std::uint32_t height,
+                   bool labels) {
+    const std::vector<isowave::Surface> surfaces = surfaces_of(values, labels);
     return camera_tuple(without_gil([&](Callbacks &) {
       return renderer_->camera(surfaces, isowave::ImageSize{width, height, 1});
     }));
   }
 
-  std::vector<nb::tuple> turntable(const std::vector<double> &isovalues, std::uint32_t num_views,
-                                   std::uint32_t width, std::uint32_t height) {
-    std::vector<isowave::Surface> surfaces;
-    for (const double isovalue : isovalues) surfaces.push_back({.isovalue = isovalue});
+  std::vector<nb::tuple> turntable(const std::vector<double> &values, std::uint32_t num_views,
+                                   std::uint32_t width, std::uint32_t height, bool labels) {
+    const std::vector<isowave::Surface> surfaces = surfaces_of(values, labels);
     const std::vector<isowave::Camera> cameras = without_gil([&](Callbacks &) {
       return renderer_->turntable(surfaces, num_views, isowave::ImageSize{width, height, 1});
     });
@@ -450,8 +458,9 @@ void add_renderers(nb::module_ &m) {
   nb::class_<PyRenderer>(m, "Renderer")
       .def("render", &PyRenderer::render, "request"_a, "on_pass"_a.none(), "interrupts"_a)
       .def("cast_rays", &PyRenderer::cast_rays, "rays"_a, "isovalue"_a, "normals"_a)
-      .def("camera", &PyRenderer::camera, "isovalues"_a, "width"_a, "height"_a)
-      .def("turntable", &PyRenderer::turntable, "isovalues"_a, "num_views"_a, "width"_a, "height"_a)
+      .def("camera", &PyRenderer::camera, "values"_a, "width"_a, "height"_a, "labels"_a = false)
+      .def("turntable", &PyRenderer::turntable, "values"_a, "num_views"_a, "width"_a, "height"_a,
+           "labels"_a = false)
       .def(
           "isovalue_notice",
           [](const PyRenderer &r, double isovalue) {

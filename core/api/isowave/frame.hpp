@@ -129,8 +129,8 @@ struct Surface {
   float opacity = 1;    ///< of each crossing, above 0; 1: nothing behind it is seen
   bool clipped = true;  ///< false: clipping planes leave it whole
   /// Labels of a segmentation, 0 to 65,535, instead of `isovalue`: the surface is that of their
-  /// indicator, which is 1 at voxels with one of them and 0 at the others, at 0.5. Needs
-  /// RendererOptions::with_labels. Surfaces may have labels in common.
+  /// indicator, which is 1 at voxels with one of them and 0 at the others, at 0.5. A
+  /// device needs RendererOptions::with_labels. Surfaces may have labels in common.
   std::vector<std::uint32_t> labels{};
 };
 

@@ -31,9 +31,9 @@ struct RendererOptions {
   /// Most FrameRequest::surfaces of a frame, 0 to 8. On a device, each takes 36 bytes a ray.
   std::uint32_t with_surfaces = 0;
   /// The volume is a segmentation: voxels are labels, exact integers from 0 to 65,535, and frames
-  /// have surfaces of labels alone (Surface::labels). Needs a device and with_surfaces; not with
-  /// with_levels, with_bounds, with_time_budget, with_rays and a field. Other labels than those of
-  /// the frame before decode all blocks once.
+  /// have surfaces of labels alone (Surface::labels). Needs with_surfaces; not with with_levels,
+  /// with_bounds, with_time_budget, with_rays and a field. Other labels than those of the frame
+  /// before decode all blocks once. The host draws both without it.
   bool with_labels = false;
   /// A second volume for Appearance::color_by_field, of any grid. It gets up to half the memory.
   std::shared_ptr<const Volume> field{};
@@ -71,8 +71,7 @@ class Renderer {
   Frame cast_rays(std::span<const Ray> rays, double isovalue, Normals normals = Normals::kSmooth);
 
   /// A view from the front right and above in which the isosurface fills a picture of that size
-  /// (none: of the largest size). If there is no surface, the volume fills the picture. With
-  /// with_labels, isovalue is a label.
+  /// (none: of the largest size). If there is no surface, the volume fills the picture.
   Camera camera(double isovalue, std::optional<ImageSize> size = {});
   /// The same for all surfaces of a frame together.
   Camera camera(const std::vector<Surface> &surfaces, std::optional<ImageSize> size = {});

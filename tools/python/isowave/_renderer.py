@@ -38,7 +38,6 @@ CAPABILITIES: dict[str, int] = {
 
 ON_HOST: dict[str, int] = {
     **dict.fromkeys(CAPABILITIES, True),
-    "labels": False,
     "surfaces": MAX_SURFACES,
 }
 
@@ -127,9 +126,9 @@ class Renderer:
     surfaces
         How many `surfaces` frames may have, up to 8. Frames of the host may have 8.
     labels
-        Frames have surfaces of labels alone, Surface(labels=...), on a device. Needs surfaces=; not
+        A device's frames have surfaces of labels alone, Surface(labels=...). Needs surfaces=; not
         with levels, bounds, time_budget, rays and field. Other labels than those of the frame
-        before decode all blocks once.
+        before decode all blocks once. Frames of the host may have either.
     field
         A second volume, of any grid, that ColorMap(by="field") colours surfaces by. It is read at
         its finest level, and takes up to half the memory.
@@ -223,7 +222,7 @@ class Renderer:
         value = self.volume._isovalue(isovalue_or_surfaces(isovalue, surfaces))
         request = Request(value, surfaces=surfaces)
         self._check_labels(request)
-        return self._camera(request.values, self.size if size is None else size_of(size))
+        return self._camera(request, self.size if size is None else size_of(size))
 
     def turntable(
         self,
@@ -239,16 +238,18 @@ class Renderer:
         self._check_labels(request)
         width, height = self.size if size is None else size_of(size)
         self._check_turn()
-        cameras = self._core.turntable(request.values, view_count(num_views), width, height)
+        cameras = self._core.turntable(
+            request.values, view_count(num_views), width, height, request.has_labels
+        )
         return [Camera(*camera) for camera in cameras]
 
     def _check_labels(self, request: Request) -> None:
         if request.has_labels and not self._can["labels"]:
             raise _core.Error("labels needs a renderer that was made with labels=True")
 
-    def _camera(self, isovalues: list[float], size: tuple[int, int]) -> Camera:
+    def _camera(self, request: Request, size: tuple[int, int]) -> Camera:
         self._check_turn()
-        return Camera(*self._core.camera(isovalues, *size))
+        return Camera(*self._core.camera(request.values, *size, request.has_labels))
 
     def _check_turn(self) -> None:
         """Raises Error in the loop over passes(), whose frame keeps the renderer until it ends."""
@@ -386,7 +387,7 @@ class Renderer:
 
     def _completed(self, request: Request) -> Request:
         size = request.size or self.size
-        camera = request.camera or self._camera(request.values, size)
+        camera = request.camera or self._camera(request, size)
         return replace(request, size=size, camera=camera)
 
     def cast_rays(

@@ -27,8 +27,8 @@ class Surface:
 
     Surface(labels=[5, 7]) is the surface of a group of a segmentation's labels: that of their
     indicator, which is 1 at voxels with one of the labels and 0 at the others, at 0.5. The voxels
-    are integers from 0 to 65,535, compressed without a loss, and an OpenCL device draws. A picture
-    has surfaces of labels alone, or none.
+    are integers from 0 to 65,535, compressed without a loss. A picture has surfaces of labels
+    alone, or none.
     """
 
     isovalue: float | None = None  #: None: of labels

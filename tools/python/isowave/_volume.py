@@ -231,8 +231,7 @@ class Volume(Voxels):
     def _make_renderer(self, largest: tuple[int, int], options: dict[str, Any]) -> Renderer:
         device = "" if options.get("device") is None else str(options["device"])
         if options.get("memory_budget") is None and _core.draws_on_host(device):
-            needs_device = options.get("field") is not None or options.get("labels")
-            if not needs_device and self._fits_host():
+            if options.get("field") is None and self._fits_host():
                 return self._host_renderer()  # which cast_rays() uses, too
         return Renderer(self, size=largest, quick=True, **options)
 

@@ -1,4 +1,4 @@
-"""Surfaces of labels: those of their indicators, drawn by an OpenCL device."""
+"""Surfaces of labels: those of their indicators, drawn by a device and by the host."""
 
 from __future__ import annotations
 
@@ -48,6 +48,8 @@ def test_a_label_s_surface_is_that_of_its_indicator(
     assert (image.rgb == expected.rgb).all() and (image.depth == expected.depth).all()
     assert (image.normals == expected.normals).all()
     assert "labels 7, 65535" in repr(image)
+    on_host = volume.render(surfaces=image.surfaces, size=SIZE, device="host")
+    assert on_host.camera == image.camera and (on_host.rgb == image.rgb).all()
 
 
 def test_a_volume_draws_labels_and_isosurfaces_in_turn(volume: isowave.Volume) -> None:
@@ -109,7 +111,6 @@ def test_what_is_no_label_is_refused(
         ({"voxel_pixels": 1}, "without voxel_pixels"),
         ({"time_budget": 1.0}, "without time_budget"),
         ({"slices": [Slice("x", 5)]}, "without slices"),
-        ({"device": "host"}, "with_labels is for devices alone"),
     ],
 )
 def test_what_labels_are_drawn_without_is_refused(
