@@ -110,10 +110,11 @@ TEST_F(CliLabels, WhatIsNoLabelIsRefused) {
 TEST_F(CliLabels, WhatLabelsAreDrawnWithoutIsRefused) {
   for (const char *option : {"-i 3", "--surface 3"})
     refuse("--labels 3 " + std::string(option), "--labels draws surfaces of labels alone");
-  for (const char *option :
-       {"--ambient 2", "--voxel-pixels 1", "--voxel-error 1", "--max-surface-error 1",
-        "--time-budget 9", "--slice z", "--reference", "--rate 8", "--light 1,0,0 --shadow 1"})
+  for (const char *option : {"--voxel-pixels 1", "--voxel-error 1", "--max-surface-error 1",
+                             "--time-budget 9", "--slice z", "--reference", "--rate 8"})
     refuse("--labels 3 " + std::string(option), "labels are drawn without it: leave it out");
+  for (const char *option : {"--ambient 2", "--light 1,0,0 --shadow 1"})
+    refuse("--labels 3,,0.5 " + std::string(option), "end at surfaces of opacity 1");
   refuse("--labels 3 --color red", "--color: surfaces have colours of their own");
   refuse("--labels 3 --pipeline blocks", "pipeline blocks draws no labels");
   refuse("--labels 3 --solver linear", "labels need --solver bernstein");

@@ -198,6 +198,23 @@ TEST_P(LabelsOnDevice, FramesOfOtherOptionsAreTheTwins) {
   }
 }
 
+/// Ambient and shadow rays, and none of any origin.
+TEST_P(LabelsOnDevice, LightRaysAreTheTwins) {
+  const Scene scene({41, 38, 45});
+  DeviceRenderer renderer(
+      device_, scene.volume,
+      {.size = kSize, .with_given_rays = true, .max_surfaces = 1, .with_labels = true});
+  FrameRequest request = scene.request({group({300, 3})});
+  request.light.towards_light = {0.3, -0.4, 1};
+  request.ambient_rays = 3;
+  request.shadow_rays = 2;
+  expect_the_twins(renderer, scene, request);
+  request.clip.planes = {scene.through_middle()};
+  expect_the_twins(renderer, scene, request);
+  EXPECT_THAT([&] { renderer.cast_rays({}, 3, Normals::kCell); },
+              ThrowsMessage<Error>(HasSubstr("draws labels alone")));
+}
+
 /// An ordinary renderer of the same device draws the indicator with the same bytes.
 TEST_P(LabelsOnDevice, PicturesAreThoseOfTheIndicator) {
   const Scene scene({41, 38, 45});
@@ -349,11 +366,7 @@ TEST_P(LabelsOnDevice, WhatTheyCannotDoIsOneLine) {
   refuses("without bound", [](FrameRequest &r) { r.bound = FieldBound::kLower; });
   refuses("without voxel_pixels", [](FrameRequest &r) { r.voxel_pixels = 1; });
   refuses("without voxel_error", [](FrameRequest &r) { r.voxel_error = 1; });
-  refuses("labels are drawn without ambient_rays", [](FrameRequest &r) { r.ambient_rays = 4; });
-  refuses("without shadow_rays", [](FrameRequest &r) {
-    r.light.towards_light = {0, 0, 1};
-    r.shadow_rays = 1;
-  });
+  refuses("made with_rays", [](FrameRequest &r) { r.ambient_rays = 4; });
   refuses("without slices", [](FrameRequest &r) { r.slices.planes = {{{{0, 0, 1}, 12}}}; });
   refuses("labels alone", [](FrameRequest &r) { r.surfaces = {{.isovalue = 1}}; });
   refuses("labels alone", [](FrameRequest &r) { r.surfaces.clear(); });
@@ -371,12 +384,10 @@ TEST_P(LabelsOnDevice, WhatTheyCannotDoIsOneLine) {
     EXPECT_THAT([&] { DeviceRenderer(device_, volume, with); },
                 ThrowsMessage<Error>(HasSubstr(text)));
   };
-  RendererOptions none = options, rays = options, bounds = options;
+  RendererOptions none = options, bounds = options;
   none.max_surfaces = 0;
-  rays.with_given_rays = true;
   bounds.with_bounds = true;
   cannot_open(scene.volume, none, "give with_surfaces");
-  cannot_open(scene.volume, rays, "leave out with_rays");
   cannot_open(scene.volume, bounds, "leave out with_bounds");
   const auto volume_of = [&](float value, VoxelType type) {
     std::vector<float> voxels = scene.voxels;
@@ -407,8 +418,9 @@ TEST(LabelsOnTheHost, FramesOfOneGroupAreTheTwins) {
 /// Isosurfaces and labels in turn, also with the least memory.
 TEST_P(LabelsOnDevice, FramesOfTheHostAreTheSame) {
   const Scene scene({41, 38, 45});
-  DeviceRenderer device(device_, scene.volume,
-                        {.size = kSize, .max_surfaces = 3, .with_labels = true});
+  DeviceRenderer device(
+      device_, scene.volume,
+      {.size = kSize, .with_given_rays = true, .max_surfaces = 3, .with_labels = true});
   FrameRequest request =
       scene.request({group({3}, 0.3f), group({300, 9}), group({65535, 3}, 0.5f)});
   const std::uint64_t least = HostLevels::least_bytes(scene.volume) +
@@ -417,6 +429,7 @@ TEST_P(LabelsOnDevice, FramesOfTheHostAreTheSame) {
     HostRenderer host(scene.volume, {.memory_limit = limit});
     for (const int label : {3, 4, 3}) {
       request.surfaces[0].labels = {static_cast<std::uint16_t>(label)};
+      request.ambient_rays = label == 4 ? 2 : 0;
       const FrameStats expected = device.render(request), got = host.render(request);
       EXPECT_EQ(got.layers.hits, expected.layers.hits);
       expect_same_hits(host.hits(), device.hits(), kSize.width);

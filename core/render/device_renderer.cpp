@@ -379,6 +379,7 @@ std::vector<HitRecord> DeviceRenderer::cast_rays(std::span<const WorldRay> world
                                                  float isovalue, Normals normals) {
   check_has_given();
   if (is_brick()) throw Error("rays of any origin go on in other bricks");
+  if (options_.with_labels) throw Error("{}", kDrawsLabelsAlone);
   if (std::isnan(isovalue)) throw Error("the isovalue is NaN: give a number");
   const std::vector<IndexRay> rays = make_index_rays(blocks_.levels[0].info, world_rays);
   Wavefront &wavefront = rays_;

@@ -60,7 +60,6 @@ RendererOptions checked(RendererOptions options, const CompressedVolume &volume,
     leave_out(options.with_levels, "with_levels");
     leave_out(options.with_bounds, "with_bounds");
     leave_out(options.with_kept_picture, "with_time_budget");
-    leave_out(options.with_given_rays, "with_rays");
     leave_out(options.field != nullptr, "a field");
     if (options.max_surfaces == 0)
       throw Error("labels are drawn as surfaces: give with_surfaces, 1 to {}", ISO_MAX_SURFACES);

@@ -131,17 +131,24 @@ void check_slice_options(const CLI::App &command, const RenderArgs &options, con
     refuse_options(command, {"--slice"}, "needs --solver bernstein");
 }
 
+/// Ambient and shadow rays of several surfaces end at opaque ones.
+void check_light_rays(const RenderArgs &options) {
+  if (options.ambient_rays != 0 || options.light.shadow_rays != 0)
+    check_some_are_opaque(options.surfaces);
+}
+
 /// Checks what --labels excludes.
 void check_label_options(const CLI::App &command, const RenderArgs &options, const Team &team) {
   if (team.size() > 1) throw Error("labels are drawn by one process alone: leave out mpirun");
   refuse_options(command, {"--isovalue", "--surface"},
                  "--labels draws surfaces of labels alone: leave out either");
   refuse_options(command, {"--color"}, "surfaces have colours of their own: --labels LABELS,COLOR");
-  refuse_options(command,
-                 {"--ambient", "--shadow", "--voxel-pixels", "--voxel-error", "--max-surface-error",
-                  "--time-budget", "--slice", "--reference", "--rate", "--tolerance",
-                  "--tolerance-relative", "--no-data"},
-                 "labels are drawn without it: leave it out");
+  refuse_options(
+      command,
+      {"--voxel-pixels", "--voxel-error", "--max-surface-error", "--time-budget", "--slice",
+       "--reference", "--rate", "--tolerance", "--tolerance-relative", "--no-data"},
+      "labels are drawn without it: leave it out");
+  check_light_rays(options);
   if (options.color_map.by_field) throw Error("labels are drawn without colours by a field");
   if (!options.slices.empty()) throw Error("labels are drawn without slices");
   if (options.renderer_flags.pipeline == "blocks")
@@ -162,12 +169,10 @@ void check_surface_options(const CLI::App &command, const RenderArgs &options, c
   refuse_options(command, {"--color"}, "surfaces have colours of their own: --surface VALUE,COLOR");
   refuse_options(command, {"--voxel-pixels", "--max-surface-error", "--time-budget"},
                  "--surface draws without it: leave it out, or draw one surface by --isovalue");
-  if (options.ambient_rays != 0 || options.light.shadow_rays != 0) {
-    if (team.size() > 1)
-      refuse_options(command, {"--ambient", "--shadow"},
-                     "with mpirun, --surface draws without it: leave out either");
-    check_some_are_opaque(options.surfaces);
-  }
+  if (team.size() > 1)
+    refuse_options(command, {"--ambient", "--shadow"},
+                   "with mpirun, --surface draws without it: leave out either");
+  check_light_rays(options);
   if (options.renderer_flags.pipeline == "blocks")
     refuse_options(command, {"--surface"}, "--pipeline blocks draws one opaque surface");
   if (solver_from_string(options.renderer_flags.solver).kind != kDefaultSolver.kind)

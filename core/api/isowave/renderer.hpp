@@ -32,8 +32,8 @@ struct RendererOptions {
   std::uint32_t with_surfaces = 0;
   /// The volume is a segmentation: voxels are labels, exact integers from 0 to 65,535, and frames
   /// have surfaces of labels alone (Surface::labels). Needs with_surfaces; not with with_levels,
-  /// with_bounds, with_time_budget, with_rays and a field. Other labels than those of the frame
-  /// before decode all blocks once. The host draws both without it.
+  /// with_bounds, with_time_budget and a field. Other labels than those of the frame before decode
+  /// all blocks once. The host draws both without it.
   bool with_labels = false;
   /// A second volume for Appearance::color_by_field, of any grid. It gets up to half the memory.
   std::shared_ptr<const Volume> field{};

@@ -127,7 +127,7 @@ class Renderer:
         How many `surfaces` frames may have, up to 8. Frames of the host may have 8.
     labels
         A device's frames have surfaces of labels alone, Surface(labels=...). Needs surfaces=; not
-        with levels, bounds, time_budget, rays and field. Other labels than those of the frame
+        with levels, bounds, time_budget and field. Other labels than those of the frame
         before decode all blocks once. Frames of the host may have either.
     field
         A second volume, of any grid, that ColorMap(by="field") colours surfaces by. It is read at

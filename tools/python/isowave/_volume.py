@@ -180,7 +180,7 @@ class Volume(Voxels):
     ) -> Image:
         """Draws a frame with a size, as render()."""
         for option, argument in request.needs.items():
-            if request.has_labels and option != "labels":
+            if request.has_labels and option not in ("labels", "rays"):
                 raise _core.Error(f"labels are drawn without {argument}: leave out {argument}")
         wanted: dict[str, Any] = {"device": device, "memory_budget": memory_budget}
         wanted |= {"size": request.size, **dict.fromkeys(request.needs, True)}
