@@ -17,6 +17,7 @@
 #include "core/render/device_renderer.hpp"
 #include "core/view/color_maps.hpp"
 #include "tools/isowave/clip_options.hpp"
+#include "tools/isowave/label_options.hpp"
 #include "tools/isowave/outputs.hpp"
 #include "tools/isowave/program.hpp"
 #include "tools/isowave/render_stats.hpp"
@@ -46,6 +47,7 @@ struct Options {
   tools::SliceOptions slices;
   std::uint32_t surfaces = 0;
   float opacity = 0.3f;
+  std::vector<std::string> labels;
   tools::LightOptions light;
   std::string field;
   tools::RendererFlags renderer;
@@ -60,10 +62,12 @@ float isovalue_of(const Options &options, const CompressedVolume &volume) {
   return middle;
 }
 
-/// The surfaces of --surfaces, around the isovalue.
+/// Those of --labels, or the surfaces of --surfaces, around the isovalue.
 std::vector<SurfaceStyle> surfaces_of(const Options &options, const CompressedVolume &volume) {
   const float step = (volume.value_range[1] - volume.value_range[0]) / 16;
   std::vector<SurfaceStyle> surfaces;
+  for (const isowave::Surface &of_labels : tools::read_labels(options.labels))
+    surfaces.push_back(core_style(of_labels));
   for (std::uint32_t i = 0; i < options.surfaces; ++i) {
     const float place = static_cast<float>(i) - 0.5f * static_cast<float>(options.surfaces - 1);
     surfaces.push_back(
@@ -122,6 +126,7 @@ FrameReport make_report(const Options &options, const CompressedVolume &volume,
   report.slices = core_slices(slices, slice_colors, volume.value_range);
   if (!slices.empty() && report.surfaces.empty()) report.surfaces = {{.isovalue = report.isovalue}};
   report.options.max_surfaces = static_cast<std::uint32_t>(report.surfaces.size());
+  report.options.with_labels = !options.labels.empty();
   report.wanted.depth = options.depth;
   isowave::Appearance light;
   tools::read_light(options.light, light);
@@ -151,14 +156,16 @@ FrameReport measure(const Options &options, std::string command) {
     report.options = renderer.options();
     report.setup_ms = renderer.setup_ms();
     renderer.render(seen_from(cameras.front(), report.request()));
-    FrameRequest of_cells = report.request();
-    of_cells.normals = Normals::kCell;  // as the floor draws
-    of_cells.ambient_rays = of_cells.shadow_rays = 0;
-    of_cells.field_values = false;
-    of_cells.surfaces.clear();
-    of_cells.slices = {};
-    renderer.render(seen_from(cameras.front(), of_cells));
-    first_hits = renderer.hits();
+    if (options.resident) {
+      FrameRequest of_cells = report.request();
+      of_cells.normals = Normals::kCell;  // as the floor draws
+      of_cells.ambient_rays = of_cells.shadow_rays = 0;
+      of_cells.field_values = false;
+      of_cells.surfaces.clear();
+      of_cells.slices = {};
+      renderer.render(seen_from(cameras.front(), of_cells));
+      first_hits = renderer.hits();
+    }
     report.views =
         measure_views(renderer, cameras, report.request(), report.wanted, options.rounds);
     report.peak_bytes = device.ledger().peak();
@@ -214,8 +221,6 @@ void check_options(const CLI::App &app, const Options &options) {
   tools::check_renderer_options(app, options.renderer);
   check_image_size({options.size.at(0), options.size.at(1), options.samples});
   if (options.budgets.empty()) tools::refuse_options(app, {"--max-passes"}, "is of --budgets");
-  if (options.light.shadow_rays != 0 && options.surfaces != 0)
-    throw Error("--shadow: --surfaces are drawn without it");
   tools::Outputs outputs;
   outputs.read_volume(options.volume);
   outputs.write("--json", options.json);
@@ -224,10 +229,9 @@ void check_options(const CLI::App &app, const Options &options) {
 /// Prints one report or the other, and writes it where asked.
 void run(const CLI::App &app, Options options, const std::string &command) {
   check_options(app, options);
-  if (options.renderer.voxel_pixels > 0) {
-    tools::want_levels(options.compression);
-    options.resident = false;  // it draws the finest level
-  }
+  if (options.renderer.voxel_pixels > 0) tools::want_levels(options.compression);
+  // The floor draws the finest level, of one isovalue.
+  if (options.renderer.voxel_pixels > 0 || !options.labels.empty()) options.resident = false;
   nlohmann::ordered_json json;
   if (options.budgets.empty()) {
     const FrameReport report = measure(options, command);
@@ -280,10 +284,12 @@ void add_options(CLI::App &app, Options &options) {
          "number of surfaces in layers, a sixteenth of the range of values apart [one opaque "
          "surface]")
       ->check(CLI::Range(0, ISO_MAX_SURFACES))
-      ->excludes("--ambient", "--voxel-pixels");
+      ->excludes("--voxel-pixels");
   app.add_option("--opacity", options.opacity, "opacity of --surfaces")
       ->check(CLI::Range(0.01f, 1.0f))
       ->capture_default_str();
+  tools::add_labels_option(app, options.labels);
+  app.get_option("--labels")->excludes("--surfaces", "--voxel-pixels", "--budgets");
   tools::add_light_options(app, options.light);
   app.add_option("--values-of", options.field,
                  "second volume, whose values at the hits colour the surface")

@@ -254,7 +254,7 @@ ordered_json options_json(const FrameReport &report) {
   json["depth"] = report.wanted.depth;
   json["clipping_planes"] = report.clip.planes.size();
   for (const SurfaceStyle &surface : report.surfaces)
-    json["surfaces"].push_back({surface.isovalue, surface.opacity});
+    json["surfaces"].push_back({surface.isovalue_of_field(), surface.opacity});
   return json;
 }
 
