@@ -124,7 +124,7 @@ Renderer make_team_renderer(Processes &processes, const std::filesystem::path &p
     const core::TeamVolume &volume = held->volume.value();
     std::unique_ptr<core::Renderer> renderer;
     // Processes do not say which of them share a host: on CPUs all wait for the first.
-    const bool is_on_cpu = held->device->info.type == core::ocl::DeviceType::kCpu;
+    const bool is_on_cpu = held->device->device.info().type == core::ocl::DeviceType::kCpu;
     core::in_turns(held->team, !is_on_cpu || held->team.rank() == 0, [&] {
       renderer = std::make_unique<core::TeamRenderer>(
           held->device->device, volume,
