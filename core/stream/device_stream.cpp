@@ -164,7 +164,13 @@ void DeviceStream::add_index(ocl::Device &device, std::span<const std::uint32_t>
 }
 
 void DeviceStream::set_groups(std::span<const std::uint8_t> table) {
-  block_index->write(packed(table), layout.bounds_begin);
+  const std::vector<std::uint32_t> words = packed(table);
+  if (block_index->device().info().platform != "Oclgrind")
+    return block_index->write(words, layout.bounds_begin);
+  // Oclgrind takes what was written in parts for uninitialised.
+  std::vector<std::uint32_t> all = block_index->read();
+  std::ranges::copy(words, all.begin() + layout.bounds_begin);
+  block_index->write(all);
 }
 
 ocl::Defines DeviceStream::defines() const {
