@@ -128,3 +128,12 @@ def test_volumes_that_are_no_segmentation_are_refused(voxels: np.ndarray) -> Non
     plain = isowave.compress(voxels, exact=True).renderer(size=SIZE, surfaces=1)
     with pytest.raises(isowave.Error, match="labels needs a renderer that was made with"):
         plain.render(surfaces=[Surface(labels=3)])
+
+
+def test_the_viewer_refuses_scenes_of_labels(volume: isowave.Volume, tmp_path: Path) -> None:
+    pytest.importorskip("simplejpeg")
+    from isowave.viewer import messages
+
+    volume.scene().labels(3).save(tmp_path / "scene.json")
+    answer = messages.scene((tmp_path / "scene.json").read_text())
+    assert answer["type"] == "error" and "the viewer draws no labels" in str(answer)
