@@ -10,6 +10,8 @@
 // and those that any voxel is in. A frame of other groups writes the table, has the ranges made
 // anew, which decodes all blocks once, and empties the cache. The kernels of such renderers are
 // built with ISO_LABELS; those of others do not change by it.
+//
+// The host has blocks of its own for each group, whose values are 0 and 1: HostLevels.
 
 #include <cstdint>
 #include <vector>
