@@ -44,9 +44,10 @@ void block_rays(benchmark::State &state) {
   state.counters["hits"] = hits;
 }
 
+using Case = std::pair<const char *, void (*)(benchmark::State &)>;
+
 const bool kRegistered = [] {
-  for (const auto &[name, function] :
-       {std::pair{"ambient", ambient}, {"ambient/block", block_rays}})
+  for (const auto &[name, function] : {Case{"ambient", ambient}, Case{"ambient/block", block_rays}})
     stage_benchmark(name, function)
         ->ArgName("width")
         ->ArgsProduct({{kWidths.begin(), kWidths.end()}});

@@ -203,7 +203,7 @@ TEST_P(LabelsOnDevice, LightRaysAreTheTwins) {
   const Scene scene({41, 38, 45});
   DeviceRenderer renderer(
       device_, scene.volume,
-      {.size = kSize, .with_given_rays = true, .max_surfaces = 1, .with_labels = true});
+      {.size = kSize, .max_surfaces = 1, .with_labels = true, .with_given_rays = true});
   FrameRequest request = scene.request({group({300, 3})});
   request.light.towards_light = {0.3, -0.4, 1};
   request.ambient_rays = 3;
@@ -420,7 +420,7 @@ TEST_P(LabelsOnDevice, FramesOfTheHostAreTheSame) {
   const Scene scene({41, 38, 45});
   DeviceRenderer device(
       device_, scene.volume,
-      {.size = kSize, .with_given_rays = true, .max_surfaces = 3, .with_labels = true});
+      {.size = kSize, .max_surfaces = 3, .with_labels = true, .with_given_rays = true});
   FrameRequest request =
       scene.request({group({3}, 0.3f), group({300, 9}), group({65535, 3}, 0.5f)});
   const std::uint64_t least = HostLevels::least_bytes(scene.volume) +

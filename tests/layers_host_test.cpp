@@ -291,6 +291,8 @@ TEST(LayersOnTheHost, AllLoopsGiveTheSameBits) {
                           innermost_first(of.three),
                           true,
                           clip,
+                          {},
+                          {},
                           {}};
       std::vector<float> isovalues;
       for (const std::uint32_t number : by.numbers) isovalues.push_back(of.three[number].isovalue);
