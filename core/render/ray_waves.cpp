@@ -10,7 +10,8 @@ RaysWave::RaysWave(BlockStore &blocks, Wavefront &rays, std::uint32_t group_size
                    RaySource source, RayPackets packets, DecodeOnDemand on_demand)
     : blocks_(blocks),
       rays_(rays),
-      start_rays_(blocks.device, rays.num_rays, group_size, blocks.levels.size() > 1, source),
+      start_rays_(blocks.device, rays.num_rays, group_size, blocks.levels.size() > 1, source,
+                  blocks.cache.slot_type),
       march_(blocks.device, rays.num_rays, group_size, solver, blocks.levels.size() > 1, source,
              blocks.cache.slot_type),
       request_ahead_(blocks.device, rays.num_rays, group_size, blocks.levels.size() > 1, source) {

@@ -1,6 +1,7 @@
 #include "core/stages/slot_type.hpp"
 
 #include <string>
+#include <utility>
 
 namespace isowave::core {
 
@@ -40,12 +41,16 @@ std::uint64_t slot_bytes(SlotType type) {
   return ISO_BLOCK_VOXELS * value_bytes(type);
 }
 
+ocl::Defines with_labels(ocl::Defines defines, SlotType type) {
+  if (type == SlotType::kGroups) defines.emplace("ISO_LABELS", "1");
+  return defines;
+}
+
 ocl::Defines with_slots(ocl::Defines defines, SlotType type) {
   if (type == SlotType::kFloat32) return defines;  // as kernels are without macros
   defines.emplace("ISO_SLOT_VALUE", name_in_kernels(type));
   defines.emplace("ISO_SLOT_BITS", std::to_string(8 * value_bytes(type)) + "u");
-  if (type == SlotType::kGroups) defines.emplace("ISO_LABELS", "1");
-  return defines;
+  return with_labels(std::move(defines), type);
 }
 
 SlotType slot_type_for(std::span<const CompressedVolume *const> levels, bool with_bounds) {

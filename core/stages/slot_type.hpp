@@ -21,7 +21,9 @@ struct SlotValue {
 /// Bytes of a slot.
 std::uint64_t slot_bytes(SlotType type);
 
-/// Adds the macros of kernels that read or write cached values.
+/// Adds the macro of kernels that read ranges of blocks: ISO_LABELS, if slots have groups.
+ocl::Defines with_labels(ocl::Defines defines, SlotType type);
+/// Adds the macros of kernels that read or write cached values, and ISO_LABELS likewise.
 ocl::Defines with_slots(ocl::Defines defines, SlotType type);
 
 /// The smallest type that holds every value which blocks of these levels are decoded to, whatever

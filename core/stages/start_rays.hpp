@@ -4,6 +4,7 @@
 
 #include "core/stages/levelled_kernel.hpp"
 #include "core/stages/macrocells.hpp"
+#include "core/stages/slot_type.hpp"
 #include "kernels/start_rays.hpp"
 
 namespace isowave::core {
@@ -12,7 +13,8 @@ class StartRays {
  public:
   /// levels: frames may have several levels of detail.
   StartRays(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_size,
-            bool levels = false, RaySource source = RaySource::kCamera);
+            bool levels = false, RaySource source = RaySource::kCamera,
+            SlotType slot_type = SlotType::kFloat32);
 
   /// Begins a wave of rays.
   ///
