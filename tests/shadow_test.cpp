@@ -216,7 +216,7 @@ TEST(Shadow, BadLightsAreRefused) {
   for (const double angle : {0.0, 46.0, kNan})
     refuse([&](FrameRequest &request) { request.light_angle = angle; }, "a light angle of");
   refuse([](FrameRequest &request) { request.surfaces = {{.isovalue = 0.1f, .opacity = 0.5f}}; },
-         "leave out shadow_rays");
+         "end at surfaces of opacity 1");
   EXPECT_NO_THROW(host.render(good));
 }
 

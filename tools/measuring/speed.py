@@ -106,8 +106,6 @@ def scenes(run):
         {"surfaces": 1, "opacity": 1},
         {"surfaces": 2, "opacity": 1},
         {"surfaces": 2, "opacity": 1, "light": "0.5,1,0.7", "shadow": 1},
-        {"labels": ["128-255"]},
-        {"labels": ["128-191", "192-255"]},
         *({"surfaces": n, "opacity": 0.3} for n in (1, 2, 4, 8)),
         {"surfaces": 2, "opacity": 0.3, "clip": CLIP},
     ]

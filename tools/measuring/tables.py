@@ -96,8 +96,6 @@ def scenes(rows):
             scene = f"{count} in layers, opacity {opacity:g}" + scene.removeprefix(
                 "one opaque surface"
             )
-        if labels := arguments.count("--labels"):
-            scene = f"{labels} of labels, opacity 1"
         if planes:
             far = "-100000" in " ".join(arguments)
             scene += ", a plane that cuts nothing" if far else f", {planes} planes with caps"
