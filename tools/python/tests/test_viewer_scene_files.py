@@ -55,7 +55,7 @@ SCENE = {
 
 def asked(page: Any, volume: FakeVolume) -> Any:
     """The request of the last picture."""
-    page.wait_for_timeout(100)
+    page.wait_for_timeout(500)  # a busy machine takes long to send a wish
     rests(page)
     drawn = (frame.request for frame in reversed(volume.frames))
     return next(request for request in drawn if request.outputs == ("rgb",))  # not of bounds
