@@ -56,7 +56,7 @@ class BrickTeamOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
  protected:
   void SetUp() override {
     if (is_llvmpipe(GetParam()) && !long_tests())
-      GTEST_SKIP() << "each thread compiles all kernels, which takes llvmpipe minutes";
+      GTEST_SKIP() << "llvmpipe takes minutes to compile the kernels of bricks";
   }
 
   using Work = std::function<void(TeamRenderer &renderer, std::uint32_t rank)>;

@@ -163,7 +163,7 @@ class FakeRenderer:
             if (request.ambient or request.shadow_rays) and not self._options["rays"]:
                 raise RuntimeError("the renderer was not made for rays of hits")
             if len(request.surfaces) > self._options.get("surfaces", 0):
-                raise RuntimeError("the renderer was not made for so many surfaces")
+                raise RuntimeError("the renderer was made for fewer surfaces")
         if len(set(request.isovalues)) < len(request.isovalues):
             raise RuntimeError(f"two surfaces have the isovalue {request.isovalue:g}")
         if request.needs_field and self._options.get("field") is None:

@@ -24,7 +24,7 @@ MAX_CAMERA_RAYS: Final = 1 << 24  # of a picture: they take memory, and make pas
 
 
 NO_SURFACES: Final = (
-    "the device has no memory for so many surfaces: draw fewer, or give a larger memory budget"
+    "the device lacks the memory for these surfaces: draw fewer, or give a larger memory budget"
 )
 #: Makes the host's renderer for a volume, a field, and a device that is not ready, or None.
 MakeHost = Callable[[VolumeLike, "VolumeLike | None", "str | None"], "RendererLike | None"]
