@@ -109,14 +109,18 @@ def open_page(browser: Any) -> Iterator[Callable[..., Any]]:
 
 
 def rests(page: Any) -> None:
-    """Waits until the lossless picture of the last wish is shown and nothing is wished for."""
+    """Waits until what was done is a wish, and its lossless picture is shown."""
+    # Some events, such as those of another size or hash, come with the next frame of the page.
+    page.evaluate(
+        """() => new Promise((done) => {
+        requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(done)));
+    })"""
+    )
     page.wait_for_function(
         """() => {
-        const { wish, shown, stage } = document.querySelector("main").dataset;
-        if (wish !== window.lastWish) { window.lastWish = wish; return false; }
-        return wish === shown && stage === "lossless";
-    }""",
-        polling=60,
+        const { wish, shown, stage, pending } = document.querySelector("main").dataset;
+        return pending === undefined && wish === shown && stage === "lossless";
+    }"""
     )
 
 
@@ -182,7 +186,6 @@ def changes(page: Any, act: Callable[[], None]) -> bool:
     """Whether the picture is another one after something was done."""
     before = page.evaluate(DRAWN)
     act()
-    page.wait_for_timeout(100)  # what is done becomes a wish with the next frame of the page
     rests(page)
     return bool(page.evaluate(DRAWN) != before)
 

@@ -16,7 +16,6 @@ MOST = SIDE - 1.0  # of the volume's box, which begins at 0
 
 def asked(page: Any, volume: FakeVolume) -> tuple[tuple[ClipPlane, ...], bool]:
     """The planes of the last picture, and whether cuts have caps."""
-    page.wait_for_timeout(100)
     rests(page)
     request = volume.frames[-1].request
     return tuple(request.clip), request.caps

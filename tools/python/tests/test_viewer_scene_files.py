@@ -55,7 +55,6 @@ SCENE = {
 
 def asked(page: Any, volume: FakeVolume) -> Any:
     """The request of the last picture."""
-    page.wait_for_timeout(500)  # a busy machine takes long to send a wish
     rests(page)
     drawn = (frame.request for frame in reversed(volume.frames))
     return next(request for request in drawn if request.outputs == ("rgb",))  # not of bounds
@@ -64,6 +63,15 @@ def asked(page: Any, volume: FakeVolume) -> Any:
 def open_file(page: Any, name: str, text: str) -> None:
     page.get_by_label("Scene file").set_input_files(
         {"name": name, "mimeType": "application/json", "buffer": text.encode()}
+    )
+
+
+def open_scene(page: Any, text: str) -> None:
+    """Opens a file that is read, and waits for its wish."""
+    wish = page.evaluate("document.querySelector('main').dataset.wish")
+    open_file(page, "scene.json", text)
+    page.wait_for_function(
+        "(before) => document.querySelector('main').dataset.wish !== before", arg=wish
     )
 
 
@@ -80,7 +88,7 @@ def test_files_are_opened_and_saved(open_page: Callable[..., Any]) -> None:  # n
         page = open_page()
         page.goto(server.url)
         rests(page)
-        open_file(page, "a.json", json.dumps(SCENE))
+        open_scene(page, json.dumps(SCENE))
         request = asked(page, volume)
         bone = tuple(isowave._core.parse_color("bone"))
         assert [each.isovalue for each in request.surfaces] == [80, 120]
@@ -108,7 +116,7 @@ def test_files_are_opened_and_saved(open_page: Callable[..., Any]) -> None:  # n
         assert fields["clip"] == [{"normal": [0, 0, -1], "offset": -12}]
         page.get_by_role("button", name="Remove", exact=True).click()
         assert asked(page, volume).clip == ()
-        open_file(page, "again.json", text)
+        open_scene(page, text)
         again = asked(page, volume)
         assert again.clip == request.clip and again.surfaces == request.surfaces
         assert again.camera == request.camera and again.color_map == wanted
@@ -270,12 +278,16 @@ def test_shadows_need_a_light_that_stays(open_page: Callable[..., Any]) -> None:
         fields = isowave._core.parse_scene(text)
         assert (fields["shadow_rays"], fields["light_angle"]) == (16, 7.5)
         assert fields["light_direction"] == pytest.approx(list(request.light))
-        # Several surfaces have none.
+        # Several surfaces have them, too, if one is opaque.
         page.get_by_role("button", name="Add surface").click()
         request = asked(page, volume)
-        assert len(request.surfaces) == 2 and request.shadow_rays == 0 and shadow.is_disabled()
+        assert (len(request.surfaces), request.shadow_rays, request.light_angle) == (2, 16, 7.5)
+        page.get_by_label("Opacity of surface 1", exact=True).fill("0.4")
+        request = asked(page, volume)
+        assert [each.opacity for each in request.surfaces] == [0.4, 0.5]
+        assert request.shadow_rays == 0 and shadow.is_disabled()
         assert isowave._core.parse_scene(saved_scene(page))["shadow_rays"] == 0
-        open_file(page, "again.json", text)
+        open_scene(page, text)
         request = asked(page, volume)
         assert (request.shadow_rays, request.light_angle) == (16, 7.5)
         page.locator("[name=light]").select_option("turns")
@@ -317,12 +329,12 @@ def test_colours_are_by_the_field(open_page: Callable[..., Any]) -> None:  # noq
         request = asked(page, volume)
         assert len(request.surfaces) == 2 and request.color_map is None
         assert not isowave._core.parse_scene(saved_scene(page))["color_by_field"]
-        open_file(page, "again.json", text)
+        open_scene(page, text)
         assert asked(page, volume).color_map == ranged
         by.select_option("caps")
         shown = asked(page, volume).color_map
         assert shown == color_map_of(isowave.ColorMap("magma", by="caps"))
-        open_file(page, "caps.json", saved_scene(page))
+        open_scene(page, saved_scene(page))
         assert asked(page, volume).color_map == shown
         page.reload()
         assert asked(page, volume).color_map == shown and state(page)["map"] == "magma,caps"

@@ -45,7 +45,6 @@ def field(page: Any, name: str, number: int) -> Any:
 
 def asked(page: Any, volume: FakeVolume) -> list[tuple[float, float]]:
     """Isovalues and opacities of the last picture's surfaces; none: it is of one opaque one."""
-    page.wait_for_timeout(100)
     rests(page)
     return [(each.isovalue, each.opacity) for each in volume.frames[-1].request.surfaces]
 
@@ -147,7 +146,6 @@ def test_eight_surfaces_are_the_most(open_page: Callable[..., Any]) -> None:  # 
         type_into(field(page, "Isovalue", 2), "80")
         page.get_by_text("two surfaces have the isovalue 80").wait_for()
         type_into(field(page, "Isovalue", 2), "81")
-        page.wait_for_timeout(100)
         rests(page)
         assert not page.get_by_text("two surfaces have").is_visible() and not page.problems
 

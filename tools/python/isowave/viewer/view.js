@@ -239,6 +239,7 @@ class View {
   /** Wishes for the state at hand, soon: at most once a frame, and when the last is answered. */
   push() {
     if (this.scheduled || this.held || !this.volume) return;
+    this.host.dataset.pending = "";
     this.scheduled = requestAnimationFrame(() => {
       this.scheduled = 0;
       const waited = performance.now() - this.sentAt;
@@ -257,6 +258,7 @@ class View {
   }
 
   sendWish() {
+    delete this.host.dataset.pending;
     const { width, height } = this.picture.getBoundingClientRect();
     if (!(width >= 1 && height >= 1)) return; // hidden: the observer pushes when it is not
     const ratio = Math.min(devicePixelRatio, MAX_PIXEL_RATIO);
