@@ -98,7 +98,8 @@ std::vector<std::map<std::string, double>> measure_stages(ocl::Device &device,
     for (const PassStats &pass : frame.passes) {
       for (const auto &[stage, ms] : pass.stage_ms) views[view][stage] += ms;
     }
-    for (const LaterPasses *later : {&frame.normals, &frame.behind, &frame.field, &frame.ambient}) {
+    for (const LaterPasses *later :
+         {&frame.normals, &frame.behind, &frame.field, &frame.slices, &frame.ambient}) {
       for (const auto &[stage, ms] : later->stage_ms) views[view][stage] += ms;
     }
   }
@@ -292,8 +293,8 @@ void add_options(CLI::App &app, Options &options) {
   app.get_option("--labels")->excludes("--surfaces", "--voxel-pixels", "--budgets");
   tools::add_light_options(app, options.light);
   app.add_option("--values-of", options.field,
-                 "second volume, whose values at the hits colour the surface")
-      ->excludes("--surfaces", "--budgets");
+                 "second volume, whose values at the hits colour surfaces")
+      ->excludes("--budgets", "--labels");
   app.add_flag("--depth", options.depth, "bring the picture's depth to the host, too");
   app.add_option("--max-passes", options.max_passes,
                  "of --budgets: a budget at which a frame takes more is not timed")

@@ -16,7 +16,8 @@
 /// begins  1: all hits. 0: the hits of the list
 /// prev    counts of the pass before
 /// In      map [1]; hits [pixel]; active_ray_ids [prev->next_active_count], unless it begins
-/// Out     field_values [pixel] of the hits; next_active_ray_ids [counts->next_active_count]: the
+/// Out     field_values [pixel] of hits on the map's surfaces;
+///         next_active_ray_ids [counts->next_active_count]: the
 ///         rays that wait. The first counts->window_count of them ask for blocks of the field:
 ///         request_block_ids [counts->requested_count, at most capacity]; slot_stamps of the blocks
 ///         that were read, or are needed; *next_counts, opened
@@ -78,6 +79,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void field_va
         } else {
           atomic_inc(&num_waiting);
         }
+      } else if (is_of_map(map, hits[pixel])) {
+        field_values[pixel] = no_value(); /* in place of that of a layer before */
       }
     }
     barrier(CLK_LOCAL_MEM_FENCE);

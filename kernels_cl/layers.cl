@@ -2,7 +2,7 @@
 /// (portable/layers.h).
 ///
 ///   [ each surface's first hits ] -> layers_choose, once for each surface
-///     -> field_values of slices -> smooth_normals -> layers_blend
+///     -> field_values of slices, of a field -> smooth_normals -> layers_blend
 ///     -> [ layers_begin -> march -> ... for each surface ] -> layers_choose ...
 ///
 /// Each surface has its own hits, which march replaces by the next ones on the same rays. Behind
@@ -64,7 +64,7 @@ kernel void layers_forget(const FrameParams frame_params, global HitRecord *laye
 ///          ISO_BLENDS: all of Out and In, Out
 /// open_counts, num_ambient, num_shadow  of the layer's hits: as shade_pixel()
 /// In       color_map [ISO_MAP_COLORS]; as layers_choose; layers [1]; values [height * width] of
-///          hits on slices
+///          hits with has_value_color()
 /// In, Out  hits [height * width] of the layer; passed [height * width]; if the layer is not the
 ///          first, first_hits [height * width] of rays that had seen nothing yet
 /// Out      colors [height * width]; *next_counts, which was 0; next_rays [next_counts->rays]
@@ -91,7 +91,9 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void layers_b
     if (ray != ISO_INVALID_ID && hits[ray].t != INFINITY) {
       const HitRecord hit = hits[ray];
       const int is_of_slices = is_of_slice(layers, hit);
-      const float value = is_of_slices && blends != ISO_COUNTS_ALONE ? values[ray] : 0.0f;
+      const float value = blends != ISO_COUNTS_ALONE && has_value_color(&shade_params, layers, hit)
+                              ? values[ray]
+                              : 0.0f;
       const int is_seen = !is_unseen(layers, hit, value);
       if (is_seen) atomic_inc(&sums[0]);
       if (blends != ISO_COUNTS_ALONE) {

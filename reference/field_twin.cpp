@@ -20,7 +20,7 @@ float value_at_hit(const FieldMap &map, const glm::uvec3 &dims, std::span<const 
 }
 
 FieldTwin::FieldTwin(const CompressedVolume &field)
-    : info_(field.info), voxels_(decode_with_libzfp(field)) {}
+    : info_(field.info), range_(known_range(field)), voxels_(decode_with_libzfp(field)) {}
 
 std::vector<float> FieldTwin::values(std::span<const VolumeInfo> levels,
                                      std::span<const HitRecord> hits, bool on_caps) const {

@@ -23,9 +23,12 @@ class FieldTwin {
   /// Returns  [hit] NaN: it has no value
   std::vector<float> values(std::span<const VolumeInfo> levels, std::span<const HitRecord> hits,
                             bool on_caps = false) const;
+  /// The field's least and largest values; none if they are not known.
+  std::optional<std::array<float, 2>> volume_range() const { return range_; }
 
  private:
   VolumeInfo info_;
+  std::optional<std::array<float, 2>> range_;
   std::vector<float> voxels_;
 };
 

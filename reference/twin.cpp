@@ -9,7 +9,6 @@
 #include "core/frame/field_values.hpp"
 #include "kernels_cl/portable/cell_intersect.h"
 #include "kernels_cl/portable/clip.h"
-#include "reference/field_twin.hpp"
 #include "reference/scalar_renderer.hpp"
 
 namespace isowave::core {
@@ -125,29 +124,32 @@ class LayerLight {
 
 }  // namespace
 
-LayeredFrame Twin::render_layers(const Camera &camera, ImageSize size,
-                                 const std::vector<SurfaceStyle> &surfaces, const Appearance &light,
-                                 Normals normals, const Clip &clip_by, const Slices &slices,
-                                 const LightRays &light_rays) const {
+LayeredFrame Twin::render_layers(const FrameRequest &request, const FieldTwin *field) const {
+  const std::vector<SurfaceStyle> &surfaces = request.surfaces;
+  const Slices &slices = request.slices;
+  const LightRays light_rays = light_rays_of(request);
   check_surfaces(surfaces, slices);
   const std::vector<std::uint32_t> order = innermost_first(surfaces);
   std::vector<FrameParams> frames;  // in that order
   frames.reserve(order.size());
   for (const std::uint32_t surface : order)
-    frames.push_back(make_frame_params(levels_[0], camera, size, surfaces[surface].isovalue));
-  const ClipParams clip = make_clip_params(levels_[0], frames[0].view, camera, clip_by);
-  const Shading shading = make_shading(levels_[0], light);
+    frames.push_back(
+        make_frame_params(levels_[0], request.camera, *request.size, surfaces[surface].isovalue));
+  const ClipParams clip =
+      make_clip_params(levels_[0], frames[0].view, request.camera, request.clip);
+  const bool has_field = field != nullptr && request.field_values;
+  const Shading shading =
+      make_layer_shading(levels_[0], request, has_field ? field->volume_range() : std::nullopt);
   const LayerParams colors =
-      make_layer_params(surfaces, slices, levels_[0], frames[0].view, camera);
+      make_layer_params(surfaces, slices, levels_[0], frames[0].view, request.camera);
   LayerLight lights(light_rays, levels_[0], voxels_[0]);
   for (std::size_t k = 0; k < order.size(); ++k) {
     const SurfaceStyle &surface = surfaces[order[k]];
     if (surface.opacity == 1) lights.add({frames[k], surface.clipped ? clip : ClipParams{}});
   }
-  FieldMap map = make_field_map({levels_.data(), 1}, levels_[0]);
-  map.first_surface = colors.num_surfaces;
+  const FieldMap map = make_field_map({levels_.data(), 1}, levels_[0]);
   const uint num_slices = colors.slices.num_planes;
-  const std::size_t num_rays = size.num_rays();
+  const std::size_t num_rays = request.size->num_rays();
   LayeredFrame result;
   result.layers.assign(ISO_MAX_LAYERS, std::vector<HitRecord>(num_rays, no_hit()));
   result.first_hits.assign(num_rays, no_hit());
@@ -187,8 +189,13 @@ LayeredFrame Twin::render_layers(const Camera &camera, ImageSize size,
       }
       HitRecord hit = left[nearest].back();
       left[nearest].pop_back();
-      if (normals == Normals::kSmooth) smooth_gradients(frames[0], voxels_[0], {&hit, 1});
-      const float value = value_at_hit(map, levels_[0].dims, voxels_[0], hit);
+      if (request.normals == Normals::kSmooth) smooth_gradients(frames[0], voxels_[0], {&hit, 1});
+      float value = no_value();
+      if (is_of_slice(&colors, hit)) {
+        value = value_at_hit(map, levels_[0].dims, voxels_[0], hit);
+      } else if (has_field) {
+        value = field->values({levels_.data(), 1}, {&hit, 1}, request.field_on_caps)[0];
+      }
       if (is_unseen(&colors, hit, value)) continue;
       result.layers[layer][i] = hit;
       if (!std::isfinite(result.first_hits[i].t)) result.first_hits[i] = hit;

@@ -13,6 +13,7 @@
 #include "core/view/detail.hpp"
 #include "core/zfp/level_bounds.hpp"
 #include "core/zfp/zfp_stream.hpp"
+#include "reference/field_twin.hpp"
 
 namespace isowave::core {
 
@@ -47,11 +48,9 @@ class Twin {
   /// The layers that a renderer must find and blend, bit for bit, of the finest level of detail.
   /// Finds all crossings of each ray with each surface before it merges them.
   ///
-  /// light_rays  of the hits of each layer; they end at surfaces of opacity 1
-  LayeredFrame render_layers(const Camera &camera, ImageSize size,
-                             const std::vector<SurfaceStyle> &surfaces, const Appearance &light,
-                             Normals normals = Normals::kSmooth, const Clip &clip = {},
-                             const Slices &slices = {}, const LightRays &light_rays = {}) const;
+  /// request  has surfaces and a size
+  /// field    for its field_values
+  LayeredFrame render_layers(const FrameRequest &request, const FieldTwin *field = nullptr) const;
 
  private:
   double voxel_pixels_;

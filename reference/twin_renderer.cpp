@@ -48,15 +48,16 @@ FrameStats TwinRenderer::render(const FrameRequest &request) {
     hits_ = twin_->render(request.camera, size_, request.isovalue, solver_, request.normals,
                           request.clip);
   } else {
-    LayeredFrame layered =
-        twin_->render_layers(request.camera, size_, request.surfaces, request.light,
-                             request.normals, request.clip, request.slices, rays);
+    FrameRequest sized = request;
+    sized.size = size_;
+    LayeredFrame layered = twin_->render_layers(sized, field_ ? &*field_ : nullptr);
     hits_ = std::move(layered.first_hits);
     colors_ = std::move(layered.colors);
     stats.layers = layered.stats;
   }
   field_values_.clear();
-  if (request.field_values) field_values_ = field_->values(levels(), hits_, request.field_on_caps);
+  if (request.surfaces.empty() && request.field_values)
+    field_values_ = field_->values(levels(), hits_, request.field_on_caps);
   if (request.surfaces.empty() && rays.count() != 0)
     open_ =
         twin_->open(request.camera, size_, request.isovalue, hits_, rays, solver_, request.clip);

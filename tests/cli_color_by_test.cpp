@@ -78,6 +78,34 @@ TEST_F(CliColorBy, AFieldColoursTheSurface) {
   EXPECT_EQ(draw("--color-by volume --color red"), draw("--color red"));
 }
 
+/// Also of several and translucent surfaces, which may keep their own colours, and beside slices.
+TEST_F(CliColorBy, AFieldColoursSeveralSurfaces) {
+  const std::string field = "'" + (folder_ / "field.zfp").string() + "'";
+  const auto made = test::run_isowave("convert " + kVolume + " -o " + field);
+  ASSERT_EQ(made.status, 0) << made.err;
+  const std::string out = quoted(folder_ / "a.png");
+  const auto draw_all = [&](const std::string &options) {
+    const auto result = test::run_isowave("render " + kVolume + " --size 48x36 --surface 60," +
+                                          options + " -o " + out);
+    EXPECT_EQ(result.status, 0) << result.err;
+    return test::read_file(folder_ / "a.png");
+  };
+  const std::string by = " --color-by " + field;
+  std::set<std::string> pictures;
+  const std::vector<std::string> all{
+      "bone,0.4 --surface 90" + by, "bone,0.4,own --surface 90" + by,
+      "bone,0.4,whole,own --surface 90 --clip=-1,0,0,-20" + by + ",0,300",
+      "bone,0.4 --slice z,12 --slice-opacity 0.5 --color-by volume --clip=-1,0,0,-20"};
+  for (const std::string &options : all) {
+    const std::string host = draw_all(options + " --device host");
+    EXPECT_EQ(draw_all(options + " --reference"), host) << options;
+    pictures.insert(host);
+  }
+  EXPECT_EQ(draw_all("bone,0.4,own --surface 90,skin,1,own --device host" + by),
+            draw_all("bone,0.4 --surface 90,skin --device host"));
+  EXPECT_EQ(pictures.size(), 4u);
+}
+
 TEST_F(CliColorBy, AnAxisStaysOneIfAFileHasItsName) {
   const std::string axis = draw("--color-by z");
   const std::filesystem::path before = std::filesystem::current_path();

@@ -170,9 +170,12 @@ TEST_F(CliRanks, DrawWhatOneProcessDraws) {
   expect_same(kFuel, "--tolerance 0.3 --orbit 2 -i 40 -i 90 --size 64x48 --pipeline blocks", 3);
 }
 
-/// Also where a rank has none but such voxels.
 TEST_F(CliRanks, VoxelsWithoutData) {
   expect_same(convert("--no-data 0"), "-i 40 --size 96x64", 3);
+}
+
+/// Also if a rank has none but such voxels.
+TEST_F(CliRanks, VoxelsWithoutDataInAllWays) {
   expect_same(kFuel, "--no-data 40 -i 38.5 --size 64x48 --pipeline blocks", 2);
   const std::string half = write_raw<float>("float32", [](int x, int y, int z) {
     const float value = static_cast<float>(x + y) + 0.25f * static_cast<float>(z);

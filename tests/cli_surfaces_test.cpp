@@ -203,7 +203,8 @@ TEST(CliSurfaceOptions, WhatIsNoSurfaceIsRefused) {
   const auto refuse = [&](const std::string &options, std::string_view text) {
     expect_one_line_error(render + options, text);
   };
-  for (const char *value : {"0.5,", "0.5,bone,", ",bone", "0.5,bone,1,1", ",", "0.5,,,whole,"})
+  for (const char *value : {"0.5,", "0.5,bone,", ",bone", "0.5,bone,1,1", ",", "0.5,,,whole,",
+                            "0.5,,,own,own", "0.5,,,whole,own,whole"})
     refuse(value,
            fmt::format("--surface {}: give VALUE, VALUE,COLOR, VALUE,COLOR,OPACITY or", value));
   refuse("''", "--surface: the value is empty");

@@ -13,9 +13,8 @@
 #include "core/base/error.hpp"
 #include "core/host/host_renderer.hpp"
 #include "core/render/device_renderer.hpp"
-#include "core/view/color_maps.hpp"
 #include "reference/twin_renderer.hpp"
-#include "tests/frame_scene.hpp"
+#include "tests/field_scene.hpp"
 #include "tests/test_devices.hpp"
 
 namespace isowave::core {
@@ -25,30 +24,6 @@ using testing::HasSubstr;
 using testing::ThrowsMessage;
 
 constexpr ImageSize kSize{51, 37};
-
-CompressedVolume compressed(const VolumeInfo &info, const test::VoxelFunction &values) {
-  ArrayReader reader(info, test::sample(info.dims, values));
-  return compress(reader, {.rate = 12, .levels = 0});
-}
-
-CompressedVolume gyroid() {
-  VolumeInfo info = test::grid_info({30, 27, 34});
-  info.spacing = {0.5, 0.7, 0.4};
-  info.origin = {300, -20, 11};
-  info.direction = glm::dmat3({0.8, 0.6, 0}, {-0.6, 0.8, 0}, {0, 0, 1});
-  return compressed(info, test::gyroid_field(11));
-}
-
-/// Another grid, turned and with other spacing, which has a part of the gyroid's hits.
-CompressedVolume field() {
-  VolumeInfo info = test::grid_info({23, 41, 18});
-  info.spacing = {0.6, 0.3, 0.7};
-  info.origin = {298.2, -1.8, 10.2};
-  info.direction = glm::dmat3({0, -1, 0}, {0.96, 0, 0.28}, {-0.28, 0, 0.96});
-  return compressed(info, [](const glm::dvec3 &p) {
-    return std::sin(0.31 * p.x) + 0.1 * p.y + std::cos(0.4 * p.z) * 0.5;
-  });
-}
 
 FrameRequest request_of(const VolumeInfo &info) {
   return {
@@ -61,19 +36,12 @@ std::vector<FrameRequest> requests(const VolumeInfo &info) {
   const FrameRequest plain = request_of(info);
   FrameRequest levels = plain, clipped = plain, open = plain;
   levels.voxel_pixels = 3;
-  const glm::dvec3 middle =
-      info.origin + info.index_to_world() * (0.5 * (glm::dvec3(info.dims) - 1.0));
-  const glm::dvec3 normal = plain.camera.at - plain.camera.eye;  // the far half stays
-  clipped.clip.planes = {{.normal = normal, .offset = glm::dot(normal, middle)}};
+  clipped.clip = test::far_half(info, plain.camera);
   open.normals = Normals::kCell;
   open.ambient_rays = 3;
   FrameRequest on_caps = clipped;
   on_caps.field_on_caps = true;
   return {plain, levels, clipped, on_caps, open};
-}
-
-Appearance by_field() {
-  return {.color_by_field = ColorByField{.colors = color_map("viridis")}};
 }
 
 std::vector<std::uint32_t> bits_of(const std::vector<float> &values) {
@@ -114,7 +82,7 @@ double oracle(const VolumeInfo &info, const std::vector<float> &voxels, const gl
 }
 
 TEST(FieldValues, AreTrilinearAtTheHits) {
-  const CompressedVolume volume = gyroid(), other = field();
+  const CompressedVolume volume = test::turned_gyroid(), other = test::field_of_gyroid();
   const std::vector<float> voxels = decode_with_libzfp(other);
   TwinRenderer twin(volume, kSize, kDefaultSolver, &other);
   // A place in the field sums eight floats of at most 64 voxels, each rounded by 2^-24 of it, and
@@ -148,7 +116,7 @@ TEST(FieldValues, AreTrilinearAtTheHits) {
 }
 
 TEST(FieldValues, OfTheVolumeItselfAreTheIsovalue) {
-  const CompressedVolume volume = gyroid();
+  const CompressedVolume volume = test::turned_gyroid();
   TwinRenderer twin(volume, kSize, kDefaultSolver, &volume);
   FrameRequest request = requests(volume.info)[2];
   twin.render(request);
@@ -170,7 +138,7 @@ TEST(FieldValues, OfTheVolumeItselfAreTheIsovalue) {
 }
 
 TEST(FieldValues, ColoursGoFromTheLeastToTheLargestAtTheHits) {
-  const CompressedVolume volume = gyroid(), other = field();
+  const CompressedVolume volume = test::turned_gyroid(), other = test::field_of_gyroid();
   TwinRenderer twin(volume, kSize, kDefaultSolver, &other);
   twin.render(request_of(volume.info));
   Appearance flat{.ambient = 1, .diffuse = 0, .specular = 0, .above = 0};
@@ -202,7 +170,7 @@ TEST(FieldValues, ColoursGoFromTheLeastToTheLargestAtTheHits) {
 }
 
 TEST(FieldValues, CapsAloneHaveValues) {
-  const CompressedVolume volume = gyroid(), other = field();
+  const CompressedVolume volume = test::turned_gyroid(), other = test::field_of_gyroid();
   TwinRenderer twin(volume, kSize, kDefaultSolver, &other);
   FrameRequest request = requests(volume.info)[2];
   twin.render(request);
@@ -225,7 +193,7 @@ TEST(FieldValues, CapsAloneHaveValues) {
 }
 
 TEST(FieldValues, TheHostDrawsTheTwinsBytes) {
-  const CompressedVolume volume = gyroid(), other = field();
+  const CompressedVolume volume = test::turned_gyroid(), other = test::field_of_gyroid();
   TwinRenderer twin(volume, kSize, kDefaultSolver, &other);
   const std::uint64_t least = HostLevels::least_bytes(volume) + HostBlocks::bytes(other.info);
   for (const std::uint64_t limit : {std::uint64_t{0}, least + (1u << 16)}) {
@@ -235,14 +203,14 @@ TEST(FieldValues, TheHostDrawsTheTwinsBytes) {
       host.render(request);
       EXPECT_EQ(bits_of(host.field_values()), bits_of(twin.field_values()));
       EXPECT_EQ(host.field_range(), twin.field_range());
-      EXPECT_EQ(host.shade(by_field()).pixels, twin.shade(by_field()).pixels);
+      EXPECT_EQ(host.shade(test::by_field()).pixels, twin.shade(test::by_field()).pixels);
     }
   }
 }
 
 /// The last band of values is not the end if shadow rays follow.
 TEST(FieldValues, FramesStoppedBeforeTheirShadowsAreCancelled) {
-  const CompressedVolume volume = gyroid(), other = field();
+  const CompressedVolume volume = test::turned_gyroid(), other = test::field_of_gyroid();
   HostRenderer host(volume, {.field = &other});
   FrameRequest request = request_of(volume.info);
   request.light.towards_light = glm::dvec3(0.2, 1, 0.3);
@@ -259,19 +227,13 @@ TEST(FieldValues, FramesStoppedBeforeTheirShadowsAreCancelled) {
 }
 
 TEST(FieldValues, RefuseWhatCannotBeShown) {
-  const CompressedVolume volume = gyroid(), other = field();
+  const CompressedVolume volume = test::turned_gyroid(), other = test::field_of_gyroid();
   HostRenderer host(volume, {.field = &other}), without(volume);
   FrameRequest request = request_of(volume.info);
-  const auto refuses = [&](const char *text) {
-    EXPECT_THAT([&] { host.render(request); }, ThrowsMessage<Error>(HasSubstr(text)));
-  };
   EXPECT_THAT([&] { without.render(request); }, ThrowsMessage<Error>(HasSubstr("has no field")));
-  request.surfaces = {{.isovalue = 0.2f, .opacity = 0.4f}};
-  refuses("without colours by a field");
-  request.surfaces.clear();
   request.field_values = false;
   host.render(request);
-  EXPECT_THAT([&] { host.shade(by_field()); }, ThrowsMessage<Error>(HasSubstr("no values")));
+  EXPECT_THAT([&] { host.shade(test::by_field()); }, ThrowsMessage<Error>(HasSubstr("no values")));
   for (const double low : {double(NAN), double(INFINITY), 1e39, 1.0}) {
     EXPECT_THAT([&] { check_color_by_field(ColorByField{.low = low, .high = 1.0}); },
                 ThrowsMessage<Error>(HasSubstr("colours cannot")));
@@ -302,24 +264,24 @@ void expect_twins_bytes(ocl::Device &device, const CompressedVolume &volume,
       EXPECT_GE(stats.field.passes, 1u);
       EXPECT_EQ(renderer.field_range(), twin.field_range());
       EXPECT_EQ(bits_of(renderer.field_values()), bits_of(twin.field_values()));
-      EXPECT_EQ(renderer.shade(by_field()).pixels, twin.shade(by_field()).pixels);
+      EXPECT_EQ(renderer.shade(test::by_field()).pixels, twin.shade(test::by_field()).pixels);
     }
   }
 }
 
 TEST_P(FieldValuesOnDevice, SmallFramesHaveTheTwinsBytes) {
-  const CompressedVolume volume = gyroid(), other = field();
+  const CompressedVolume volume = test::turned_gyroid(), other = test::field_of_gyroid();
   expect_twins_bytes(device_, volume, other, {}, std::array{request_of(volume.info)});
 }
 
 TEST_P(FieldValuesOnDevice, FewSlotsServeAllHits) {
-  const CompressedVolume volume = gyroid(), other = field();
+  const CompressedVolume volume = test::turned_gyroid(), other = test::field_of_gyroid();
   expect_twins_bytes(device_, volume, other, {.cache_slots = 8, .field_slots = 8},
                      std::array{request_of(volume.info)});
 }
 
 TEST_P(FieldValuesOnDevice, HolesHaveNoValue) {
-  const CompressedVolume volume = gyroid();
+  const CompressedVolume volume = test::turned_gyroid();
   VolumeInfo info = volume.info;
   std::vector<float> voxels = test::sample(info.dims, test::gyroid_field(7));
   for (std::size_t i = 0; i < voxels.size(); ++i) {
@@ -340,7 +302,7 @@ TEST_P(FieldValuesOnDevice, HolesHaveNoValue) {
 }
 
 TEST_P(FieldValuesOnDevice, StoppedFramesLeaveNothing) {
-  const CompressedVolume volume = gyroid(), other = field();
+  const CompressedVolume volume = test::turned_gyroid(), other = test::field_of_gyroid();
   const FrameRequest request = request_of(volume.info);
   TwinRenderer twin(volume, kSize, kDefaultSolver, &other);
   twin.render(request);
@@ -360,7 +322,7 @@ TEST_P(FieldValuesOnDevice, StoppedFramesLeaveNothing) {
 }
 
 TEST_P(FieldValuesOnDevice, BudgetsAreShared) {
-  const CompressedVolume volume = gyroid(), other = field();
+  const CompressedVolume volume = test::turned_gyroid(), other = test::field_of_gyroid();
   expect_twins_bytes(device_, volume, other, {.memory_budget = 600'000},
                      std::array{request_of(volume.info)});
   EXPECT_LE(device_.ledger().peak(), 600'000u);
@@ -372,7 +334,7 @@ TEST_P(FieldValuesOnDevice, BudgetsAreShared) {
 }
 
 TEST_P(FieldValuesOnDevice, HaveTheTwinsBytesWithLevelsClippedAndOpen) {
-  const CompressedVolume volume = gyroid(), other = field();
+  const CompressedVolume volume = test::turned_gyroid(), other = test::field_of_gyroid();
   for (const StreamPlace place : {StreamPlace::kDevice, StreamPlace::kHost})
     expect_twins_bytes(device_, volume, other,
                        {.stream = place, .with_levels = true, .field_slots = 40},

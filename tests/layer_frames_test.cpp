@@ -93,8 +93,11 @@ class LayeredVolume {
   void expect_frame(const Camera &camera, const std::vector<SurfaceStyle> &surfaces,
                     const Clip &clip) {
     const LayerOracle oracle(info_, camera, kSize, clip, surfaces, voxels_);
-    const LayeredFrame frame =
-        twin_.render_layers(camera, kSize, surfaces, {}, Normals::kCell, clip);
+    const LayeredFrame frame = twin_.render_layers({.camera = camera,
+                                                    .size = kSize,
+                                                    .clip = clip,
+                                                    .surfaces = surfaces,
+                                                    .normals = Normals::kCell});
     const LayerAccuracy tally = judge_layers(oracle, frame.layers);
     EXPECT_EQ(tally.failures(), 0u) << text(oracle, tally, frame.layers);
     EXPECT_TRUE((clip.caps && !clip.planes.empty()) || tally.caps == 0);

@@ -188,7 +188,12 @@ class LayerJudge : public testing::Test {
     return {{0.2f, {1, 0, 0}, 0.05f}, {0.6f, {0, 1, 0}, 0.1f}, {-0.4f, {0, 0, 1}, 0.9f}};
   }
   LayeredFrame draw(const std::vector<SurfaceStyle> &surfaces) const {
-    return Twin(of_.volume).render_layers(camera_, kSize, surfaces, {}, Normals::kCell, clip_);
+    return Twin(of_.volume)
+        .render_layers({.camera = camera_,
+                        .size = kSize,
+                        .clip = clip_,
+                        .surfaces = surfaces,
+                        .normals = Normals::kCell});
   }
   LayerAccuracy judge(const Layers &layers) const { return judge_layers(oracle_, layers); }
   /// Changes each ray with more than `least` hits, and counts them.
@@ -313,8 +318,12 @@ TEST_F(LayerJudge, FindsFramesThatAreClippedElsewhere) {
   EXPECT_GT(right_.caps, 50u);
   Clip moved = clip_;
   moved.planes[0].offset += 1e-3;
-  const LayeredFrame frame =
-      Twin(of_.volume).render_layers(camera_, kSize, surfaces_, {}, Normals::kCell, moved);
+  const LayeredFrame frame = Twin(of_.volume)
+                                 .render_layers({.camera = camera_,
+                                                 .size = kSize,
+                                                 .clip = moved,
+                                                 .surfaces = surfaces_,
+                                                 .normals = Normals::kCell});
   EXPECT_GT(judge(frame.layers).wrong_places, right_.caps / 4);
   const LayerAccuracy no_caps = judge_changed(0, [](auto &ray) {
     for (HitRecord &hit : ray) hit.cell &= ~ISO_CAP;

@@ -141,8 +141,7 @@ void expect_same_picture(HostRenderer &renderer, const FrameRequest &request,
 /// Draws the frame, and compares all of it with the twin's.
 void expect_twins(HostRenderer &renderer, const Twin &twin, const FrameRequest &request,
                   Seen &seen) {
-  const LayeredFrame expected = twin.render_layers(request.camera, *request.size, request.surfaces,
-                                                   request.light, request.normals, request.clip);
+  const LayeredFrame expected = twin.render_layers(request);
   const FrameStats stats = renderer.render(request);
   expect_same_hits(renderer.hits(), expected.layers.front(), request.size->ray_columns());
   ASSERT_EQ(renderer.colors().size(), expected.colors.size());
@@ -283,17 +282,16 @@ TEST(LayersOnTheHost, AllLoopsGiveTheSameBits) {
     const Camera camera = cameras_of(info)[2];
     const FrameParams frame = make_frame_params(info, camera, kSize, 0);
     for (const Clip &clip_by : clips_of(info)) {
-      const LayeredFrame expected =
-          twin.render_layers(camera, kSize, of.three, light(), Normals::kSmooth, clip_by);
+      const LayeredFrame expected = twin.render_layers({.camera = camera,
+                                                        .size = kSize,
+                                                        .clip = clip_by,
+                                                        .surfaces = of.three,
+                                                        .light = light()});
       const ClipParams clip = make_clip_params(info, frame.view, camera, clip_by);
-      const LayerBlend by{make_shade_params(info, light()),
-                          make_layer_params(of.three, {}, info, frame.view, camera),
-                          innermost_first(of.three),
-                          true,
-                          clip,
-                          {},
-                          {},
-                          {}};
+      const LayerBlend by{.shading = make_shade_params(info, light()),
+                          .colors = make_layer_params(of.three, {}, info, frame.view, camera),
+                          .numbers = innermost_first(of.three),
+                          .clip = clip};
       std::vector<float> isovalues;
       for (const std::uint32_t number : by.numbers) isovalues.push_back(of.three[number].isovalue);
       std::vector<HostLevel> surfaces = levels.open_surfaces(frame, isovalues, 0);
@@ -454,7 +452,7 @@ TEST(LayersOnTheHost, DrawsUntilADeviceIsReady) {
   request.surfaces = of.three;
   EXPECT_TRUE(renderer.ready_for(request));
   EXPECT_EQ(renderer.render(request).layers.hits,
-            Twin(of.volume).render_layers(request.camera, kSize, of.three, {}).stats.hits);
+            Twin(of.volume).render_layers(request).stats.hits);
   EXPECT_FALSE(renderer.ready());
   made.set_value();
   renderer.wait();

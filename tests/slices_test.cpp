@@ -333,8 +333,8 @@ TEST(Slices, LieBetweenSurfacesInTheirOrder) {
                     20,
                     color_map("gray")};
   const Twin twin(volume);
-  const LayeredFrame frame =
-      twin.render_layers(camera, kSize, request.surfaces, {}, Normals::kSmooth, {}, request.slices);
+  const LayeredFrame frame = twin.render_layers(
+      {.camera = camera, .size = kSize, .surfaces = request.surfaces, .slices = request.slices});
   const std::size_t middle = kSize.width / 2 + kSize.width * std::size_t{kSize.height / 2};
   const std::vector<std::uint32_t> expected{3, 0, 2, 1, 4};
   float before = 0;

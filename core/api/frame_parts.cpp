@@ -21,8 +21,7 @@ namespace {
 
 FrameStatistics public_statistics(const core::FrameStats &stats, std::uint64_t num_rays) {
   FrameStatistics result;
-  result.passes = static_cast<std::uint32_t>(stats.passes.size()) + stats.normals.passes +
-                  stats.field.passes + stats.ambient.passes;
+  result.passes = static_cast<std::uint32_t>(stats.passes.size());
   result.rays = num_rays;
   result.hits = stats.rays_hit;
   result.layers = stats.layers.layers;
@@ -37,8 +36,10 @@ FrameStatistics public_statistics(const core::FrameStats &stats, std::uint64_t n
   result.normals_ms = stats.normals.ms;
   result.ambient_passes = stats.ambient.passes;
   result.ambient_ms = stats.ambient.ms;
-  result.field_ms = stats.field.ms;
-  for (const core::LaterPasses *later : {&stats.normals, &stats.field, &stats.ambient}) {
+  result.field_ms = stats.field.ms + stats.slices.ms;
+  for (const core::LaterPasses *later :
+       {&stats.normals, &stats.behind, &stats.field, &stats.slices, &stats.ambient}) {
+    result.passes += later->passes;
     result.decoded_blocks += later->decoded_blocks;
     for (const auto &[stage, ms] : later->stage_ms) result.stage_ms[stage] += ms;
   }
@@ -74,8 +75,10 @@ core::Clip core_clip(const std::vector<ClipPlane> &planes, bool caps) {
 }
 
 core::SurfaceStyle core_style(const Surface &surface) {
-  core::SurfaceStyle style{
-      .color = to_glm(surface.color), .opacity = surface.opacity, .clipped = surface.clipped};
+  core::SurfaceStyle style{.color = to_glm(surface.color),
+                           .opacity = surface.opacity,
+                           .clipped = surface.clipped,
+                           .mapped = surface.mapped};
   for (const std::uint32_t label : surface.labels) {
     if (label >= ISO_NUM_LABELS)
       throw core::Error("{} is no label: labels are 0 to {}", label, ISO_NUM_LABELS - 1);
@@ -225,6 +228,9 @@ core::FrameRequest core_request(const FrameRequest &request, const core::Compres
 void check_wanted(const FrameRequest &request, const core::Abilities &abilities) {
   if ((request.want_positions || request.want_hits) && !abilities.cells)
     throw core::Error("a team's hits have no cells: leave out want_positions and want_hits");
+  if (request.want_field && !request.surfaces.empty())
+    throw core::Error(
+        "values of a field are those of one opaque surface: leave out surfaces, or want_field");
   if (!request.want_bounds) return;
   if (request.time_budget_ms)
     throw core::Error("a picture within a time has no bounds of its error: leave out want_bounds");

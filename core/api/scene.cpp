@@ -362,7 +362,8 @@ FrameRequest scene_request(const Scene &scene) {
   if (scene.surfaces.empty()) return request;
   request.isovalue = scene.surfaces.front().isovalue;
   const Surface &first = scene.surfaces.front();
-  if (scene.surfaces.size() == 1 && first.opacity == 1 && first.clipped && first.labels.empty()) {
+  if (scene.surfaces.size() == 1 && first.opacity == 1 && first.clipped && first.mapped &&
+      first.labels.empty()) {
     request.appearance.surface = first.color;
   } else {
     request.surfaces = scene.surfaces;

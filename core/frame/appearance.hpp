@@ -26,7 +26,8 @@ struct ColorByAxis {
 /// Colours of surfaces by the values of a field at the hits (FrameRequest::field_values). Hits
 /// without a value have the surface's own colour.
 struct ColorByField {
-  /// Values of the first and the last colour; none: the least and the largest at the frame's hits.
+  /// Values of the first and the last colour; none: the least and the largest at the frame's hits,
+  /// or in frames of several or translucent surfaces, of the field.
   std::optional<double> low{}, high{};
   ColorTable colors{};
 };
@@ -83,7 +84,7 @@ void check_color_by_field(const ColorByField &color_by);
 std::array<double, 2> range_along(const VolumeInfo &info, const glm::dvec3 &axis);
 
 ShadeParams make_shade_params(const VolumeInfo &info, const Appearance &appearance);
-/// field_range  values of a field at the frame's hits, for ends that ColorByField does not give
+/// field_range  values of a field, for ends that ColorByField does not give
 /// Throws       Error: as check_color_by()
 Shading make_shading(const VolumeInfo &info, const Appearance &appearance,
                      const std::optional<std::array<float, 2>> &field_range = {});

@@ -20,8 +20,26 @@ FieldMap make_field_map(std::span<const VolumeInfo> levels, const VolumeInfo &fi
     map.rows[4 * row + 3] = static_cast<float>(begin[row]);
     map.dims[row] = field.dims[row];
   }
+  map.surfaces = std::numeric_limits<uint>::max();
   set_level_places(levels, map);
   return map;
+}
+
+std::optional<std::array<float, 2>> known_range(const CompressedVolume &volume) {
+  if (volume.value_range == kUnknownRange) return {};
+  return volume.value_range;
+}
+
+Shading make_layer_shading(const VolumeInfo &info, const FrameRequest &request,
+                           const std::optional<std::array<float, 2>> &field_range) {
+  Appearance light = request.light;
+  if (!request.field_values) light.color_by_field.reset();
+  const auto &by = light.color_by_field;
+  if (by && !(by->low && by->high) && !field_range)
+    throw Error(
+        "the least and the largest value of the field are not known: give the values of the first "
+        "and the last colour");
+  return make_shading(info, light, field_range);
 }
 
 std::optional<std::array<float, 2>> range_of_values(std::span<const float> values) {

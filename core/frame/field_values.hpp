@@ -5,7 +5,10 @@
 #include <optional>
 #include <span>
 
+#include "core/frame/appearance.hpp"
+#include "core/frame/frame_request.hpp"
 #include "core/volume/volume.hpp"
+#include "core/zfp/zfp_stream.hpp"
 #include "kernels_cl/portable/field_value.h"
 
 namespace isowave::core {
@@ -13,6 +16,16 @@ namespace isowave::core {
 /// levels  of detail that may have hits, the finest first
 /// Throws  Error: a volume's directions do not span space
 FieldMap make_field_map(std::span<const VolumeInfo> levels, const VolumeInfo &field);
+
+/// The least and the largest voxel of a volume; none if they are not known.
+std::optional<std::array<float, 2>> known_range(const CompressedVolume &volume);
+
+/// The shading of a frame of several or translucent surfaces.
+///
+/// field_range  known_range() of the renderer's field, if it has one
+/// Throws       Error: colours by a field begin or end at values that are neither given nor known
+Shading make_layer_shading(const VolumeInfo &info, const FrameRequest &request,
+                           const std::optional<std::array<float, 2>> &field_range);
 
 /// The least and the largest of such values; none if all are NaN.
 std::optional<std::array<float, 2>> range_of_values(std::span<const float> values);

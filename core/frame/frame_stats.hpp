@@ -30,8 +30,8 @@ struct PassStats {
       stage_ms;  ///< by stage; empty unless the device was opened with profiling
 };
 
-/// Statistics of the passes after those that found the hits: normals, behind hits, a field, and
-/// ambient and shadow rays.
+/// Statistics of the passes after those that found the hits: normals, behind hits, a field, slices,
+/// and ambient and shadow rays.
 struct LaterPasses {
   std::uint32_t passes = 0;
   std::uint64_t decoded_blocks = 0;        ///< blocks decoded in these passes
@@ -110,6 +110,7 @@ struct FrameStats {
   LaterPasses normals;                          ///< passes for Normals::kSmooth
   LaterPasses behind;                           ///< passes of rays behind their first hits
   LaterPasses field;                            ///< passes for values of a field
+  LaterPasses slices;                           ///< passes for voxels at slices
   LaterPasses ambient;                          ///< passes of ambient and shadow rays
   std::size_t first_level = 0, last_level = 0;  ///< levels of detail that drew; 0: the finest
   double total_ms = 0;  ///< wall clock, from camera to finished hit buffer on the device

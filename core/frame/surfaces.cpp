@@ -71,6 +71,12 @@ std::vector<std::uint32_t> innermost_first(const std::vector<SurfaceStyle> &surf
   return numbers;
 }
 
+uint mapped_surfaces(const std::vector<SurfaceStyle> &surfaces) {
+  uint mapped = surfaces.empty() ? 1 : 0;
+  for (std::size_t i = 0; i < surfaces.size(); ++i) mapped |= surfaces[i].mapped ? 1u << i : 0;
+  return mapped;
+}
+
 LayerParams make_layer_params(const std::vector<SurfaceStyle> &surfaces, const Slices &slices,
                               const VolumeInfo &finest, const View &view, const Camera &camera) {
   LayerParams params{};
@@ -78,6 +84,7 @@ LayerParams make_layer_params(const std::vector<SurfaceStyle> &surfaces, const S
   for (std::size_t i = 0; i < surfaces.size(); ++i) {
     const SurfaceStyle &surface = surfaces[i];
     params.surfaces[i] = {surface.color.r, surface.color.g, surface.color.b, surface.opacity};
+    if (!surface.mapped) params.unmapped |= 1u << i;
   }
   Clip planes;
   for (std::size_t i = 0; i < slices.planes.size(); ++i) {

@@ -21,6 +21,7 @@ struct SurfaceStyle {
   glm::vec3 color{219 / 255.0f, 189 / 255.0f, 135 / 255.0f};  ///< display values, [0,1]
   float opacity = 1;    ///< of each crossing, (0,1]; 1: nothing behind it is seen
   bool clipped = true;  ///< false: clipping planes leave it whole
+  bool mapped = true;   ///< false: colour maps leave it its own colour
   /// The labels of the group, of a renderer of labels: the surface is that of their indicator, and
   /// `isovalue` is not used. Empty: an isosurface.
   std::vector<std::uint16_t> labels{};
@@ -63,6 +64,9 @@ void check_some_are_opaque(const Surfaces &surfaces) {
 /// The numbers of surfaces, those of larger isovalues first: the order in which layers prefer hits
 /// at one place. Surfaces of labels keep the order in which they are given.
 std::vector<std::uint32_t> innermost_first(const std::vector<SurfaceStyle> &surfaces);
+
+/// FieldMap::surfaces of a frame's surfaces; of none: of the one opaque surface.
+uint mapped_surfaces(const std::vector<SurfaceStyle> &surfaces);
 
 /// finest, view, camera  as make_clip_params()
 LayerParams make_layer_params(const std::vector<SurfaceStyle> &surfaces, const Slices &slices,

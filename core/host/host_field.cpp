@@ -34,7 +34,8 @@ float value_at_hit(const FieldMap &map, const FrameParams &grid, const HostField
 
 HostFieldValues::HostFieldValues(const CompressedVolume &field, std::span<const VolumeInfo> levels,
                                  HostRoom &room, std::uint32_t num_threads)
-    : map_(make_field_map(levels, field.info)),
+    : range_(known_range(field)),
+      map_(make_field_map(levels, field.info)),
       grid_(make_grid_params(field.info)),
       blocks_(field, room, num_threads),
       decoded_((blocks_.select(0), blocks_.field())) {}

@@ -28,8 +28,11 @@ class HostFieldValues {
   /// values[i]: that of hits[i]. Within HostRoom::run().
   void operator()(std::span<const HitRecord> hits, bool on_caps, float *values) const;
   void forget() { blocks_.forget(); }
+  /// As known_range() of the field.
+  std::optional<std::array<float, 2>> volume_range() const { return range_; }
 
  private:
+  std::optional<std::array<float, 2>> range_;
   FieldMap map_;
   FrameParams grid_;
   HostBlocks blocks_;

@@ -132,10 +132,15 @@ inline void trace_packets_behind(const HostLevel &surface, const LayerPacket &pa
 }
 #endif
 
-/// The value of the volume at a hit on a slice; 0 of another hit.
-inline float slice_value(const LayerBlend &by, const HostLevel &level, const HitRecord &hit) {
-  return is_of_slice(&by.colors, hit) ? value_at_hit(by.slice_map, level.frame, level.field, hit)
-                                      : 0.0f;
+/// The value that a hit's colour is by: of the volume on a slice, of the field on a surface.
+inline float value_of_color(const LayerBlend &by, const HostLevel &level, const HitRecord &hit) {
+  float value = no_value();
+  if (is_of_slice(&by.colors, hit)) {
+    value = value_at_hit(by.slice_map, level.frame, level.field, hit);
+  } else if (by.field != nullptr && has_value_color(&by.shading.params, &by.colors, hit)) {
+    (*by.field)({&hit, 1}, by.field_on_caps, &value);
+  }
+  return value;
 }
 
 /// The shares of the sky and of the scene's light that a hit sees.
@@ -213,7 +218,7 @@ inline uint blend_packet(std::span<const HostLevel> surfaces, const LayerBlend &
       } else {
         passed[lane] |= 1u << (surface_of(hit) - by.colors.num_surfaces);
       }
-      const float value = slice_value(by, surface, hit);
+      const float value = value_of_color(by, surface, hit);
       const HitLight light = light_of_hit<kTraceRay>(surfaces, by, ray_id, hit);
       colors[ray_id] =
           blend_hit(&surface.frame, &by.shading.params, by.shading.color_map.data(), &by.colors,

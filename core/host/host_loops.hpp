@@ -107,6 +107,8 @@ inline uint side_of_block(const FrameParams &frame, const HostField &field, Bloc
                                                                             : ISO_SIDE_OUTSIDE;
 }
 
+class HostFieldValues;
+
 struct RayTile {
   uint begin_x, begin_y, end_x, end_y;  ///< of the frame's rays
 };
@@ -124,13 +126,15 @@ struct AmbientRays {
 /// How the surfaces of a frame are blended.
 struct LayerBlend {
   Shading shading;
-  LayerParams colors;
-  std::vector<std::uint32_t> numbers;  ///< innermost_first()
-  bool is_smooth;                      ///< Normals::kSmooth
-  ClipParams clip;                     ///< of slices
-  FieldMap slice_map;                  ///< from hits on slices to the volume
-  AmbientRays rays;                    ///< of the hits of each layer
-  std::vector<std::size_t> opaque;     ///< the surfaces that such rays may meet
+  LayerParams colors{};
+  std::vector<std::uint32_t> numbers{};    ///< innermost_first()
+  bool is_smooth = true;                   ///< Normals::kSmooth
+  ClipParams clip{};                       ///< of slices
+  FieldMap slice_map{};                    ///< from hits on slices to the volume
+  const HostFieldValues *field = nullptr;  ///< for colours of the surfaces; null: none
+  bool field_on_caps = false;              ///< FrameRequest::field_on_caps
+  AmbientRays rays{};                      ///< of the hits of each layer
+  std::vector<std::size_t> opaque{};       ///< the surfaces that such rays may meet
 };
 
 struct HostLoops {

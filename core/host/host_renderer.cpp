@@ -188,15 +188,17 @@ std::vector<HostLevel> HostRenderer::open_surfaces(const FrameRequest &request,
 /// layers.
 void HostRenderer::draw_surfaces(const FrameRequest &request, const FrameParams &frame,
                                  ImageSize size, FrameStats &stats) {
-  LayerBlend by{
-      make_shading(info_, request.light),
-      make_layer_params(request.surfaces, request.slices, info_, frame.view, request.camera),
-      innermost_first(request.surfaces),
-      request.normals == Normals::kSmooth,
-      make_clip_params(info_, frame.view, request.camera, request.clip),
-      make_field_map({&info_, 1}, info_),
-      {},
-      {}};
+  const bool has_field = request.field_values;
+  LayerBlend by{.shading = make_layer_shading(info_, request,
+                                              has_field ? field_->volume_range() : std::nullopt),
+                .colors = make_layer_params(request.surfaces, request.slices, info_, frame.view,
+                                            request.camera),
+                .numbers = innermost_first(request.surfaces),
+                .is_smooth = request.normals == Normals::kSmooth,
+                .clip = make_clip_params(info_, frame.view, request.camera, request.clip),
+                .slice_map = make_field_map({&info_, 1}, info_),
+                .field = has_field ? &*field_ : nullptr,
+                .field_on_caps = request.field_on_caps};
   const LightRays light_rays = light_rays_of(request);
   const std::vector<AmbientDirection> directions = make_light_directions(light_rays);
   by.rays = {make_ambient_params(info_, light_rays.num_ambient),
@@ -208,7 +210,6 @@ void HostRenderer::draw_surfaces(const FrameRequest &request, const FrameParams 
   for (std::size_t k = 0; k < by.numbers.size(); ++k) {
     if (request.surfaces[by.numbers[k]].opacity == 1) by.opaque.push_back(k);
   }
-  by.slice_map.first_surface = by.colors.num_surfaces;
   std::vector<HostLevel> surfaces = open_surfaces(request, frame, by.numbers);
   for (std::size_t k = 0; k < surfaces.size(); ++k) {
     if (request.surfaces[by.numbers[k]].clipped)
@@ -259,7 +260,7 @@ std::uint64_t HostRenderer::trace(std::span<const HostLevel> drawing, const RayT
 template <class DrawTile>
 void HostRenderer::draw_bands(const FrameRequest &request, DrawTile draw_tile, FrameStats &stats) {
   const std::size_t num_rays = std::size_t{frame_.view.width} * frame_.view.height;
-  if (request.field_values) field_values_.assign(num_rays, no_value());
+  if (request.surfaces.empty() && request.field_values) field_values_.assign(num_rays, no_value());
   if (request.on_pass) {
     hits_.assign(num_rays, no_hit());
   } else {

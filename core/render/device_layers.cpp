@@ -4,6 +4,7 @@
 #include <limits>
 #include <utility>
 
+#include "core/frame/field_values.hpp"
 #include "core/render/device_renderer.hpp"
 
 namespace isowave::core {
@@ -39,7 +40,8 @@ void DeviceRenderer::draw_layers(const FrameRequest &request, Frame &frame) {
   layers_->open(
       request.surfaces,
       make_layer_params(request.surfaces, request.slices, finest, rays_.frame.view, request.camera),
-      make_shading(finest, request.light));
+      make_layer_shading(finest, request,
+                         request.field_values ? field_->volume_range() : std::nullopt));
   layers_->clear(rays_);
   if (!request.slices.planes.empty()) rays_.field_values.fill(no_value());
   has_layers_ = true;
@@ -130,7 +132,8 @@ LayerCounts DeviceRenderer::draw_layer(std::uint32_t layer, const FrameRequest &
                                        Frame &frame) {
   const bool is_further = layer != 0, is_drawn = layer < ISO_MAX_LAYERS;
   const bool is_lit = is_drawn && light_rays_of(request).count() != 0,
-             is_smooth = is_drawn && request.normals == Normals::kSmooth;
+             is_smooth = is_drawn && request.normals == Normals::kSmooth,
+             has_field = is_drawn && request.field_values;
   if (is_further) layers_->swap_layer(rays_);
   is_in_further_layer_ = is_further;
   rays_.num_ambient = rays_.num_shadow = 0;
@@ -138,13 +141,19 @@ LayerCounts DeviceRenderer::draw_layer(std::uint32_t layer, const FrameRequest &
   layers_->choose(rays_, isovalues.size(), !is_further);
   rays_.frame.screen = layers_screen_;
   if (is_drawn && !request.slices.planes.empty()) {
-    slice_values_->set_layer(!is_further, static_cast<std::uint32_t>(request.surfaces.size()));
+    slice_values_->set_layer(!is_further, ~0u << request.surfaces.size());
     run(*slice_values_, frame);
     if (frame.stats.cancelled) rays_.field_values.fill(no_value());
   }
-  const bool previews = !is_further && frame.on_pass && (is_smooth || is_lit);
+  const bool previews = !is_further && frame.on_pass && (is_smooth || is_lit || has_field);
   if (previews) layers_->blend(rays_, true, ISO_PREVIEWS);
   if (is_smooth) run(is_further ? static_cast<Wave &>(*layer_normals_) : normals_of_camera_, frame);
+  if (has_field) {
+    field_->set_layer(is_further ? &*layers_ : nullptr);
+    run(*field_, frame);
+    // Blends see what the last layer had otherwise.
+    if (frame.stats.cancelled) rays_.field_values.fill(no_value());
+  }
   if (is_lit) light_layer(request, clip, isovalues, frame);
   if (previews) layers_->clear(rays_);
   const LayerCounts counts =

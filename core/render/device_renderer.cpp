@@ -23,12 +23,9 @@ namespace isowave::core {
 namespace {
 
 /// Slots that the frame has freed of blocks that it had requested itself.
-///
-/// has_slices  values of the field are the volume's own
-std::uint64_t recycled_blocks(const FrameStats &stats, bool has_slices = false) {
+std::uint64_t recycled_blocks(const FrameStats &stats) {
   std::uint64_t sum = stats.normals.recycled_blocks + stats.behind.recycled_blocks +
-                      stats.ambient.recycled_blocks +
-                      (has_slices ? stats.field.recycled_blocks : 0);
+                      stats.slices.recycled_blocks + stats.ambient.recycled_blocks;
   for (const PassStats &pass : stats.passes) sum += pass.counts.recycled_count;
   return sum;
 }
@@ -74,13 +71,13 @@ FrameStats DeviceRenderer::render(const FrameRequest &request) {
   } else {
     draw_layers(request, frame);
   }
-  if (request.field_values) run(*field_, frame);
+  if (has_field_values_) run(*field_, frame);
   FrameStats &stats = frame.stats;
   if (request.surfaces.empty() && light_rays.count() != 0) {
     for (std::uint32_t round = 0; round < light_rays.count(); ++round) cast_round(round, frame);
     if (!stats.cancelled) (*ambient_)(rays_, light_rays.count());
   }
-  blocks_.close(recycled_blocks(stats, !request.slices.planes.empty()), stats.cancelled);
+  blocks_.close(recycled_blocks(stats), stats.cancelled);
   rays_.frame = blocks_.levels[0].frame;  // for shading
   const Uploads after = blocks_.uploads();
   stats.uploaded_blocks = after.blocks - before.blocks;
@@ -294,8 +291,10 @@ void DeviceRenderer::begin_frame(const FrameRequest &request) {
   rays_.set_clip(make_clip_params(blocks_.levels[0].info, frames.front().view, request.camera,
                                   first.clipped ? request.clip : Clip{}));
   open_frame(std::move(frames), values, request.bound, RaySource::kCamera);
-  has_field_values_ = request.field_values;
-  if (field_) field_->begin_frame(has_field_values_, request.field_on_caps);
+  has_field_values_ = request.field_values && request.surfaces.empty();  // layers blend them
+  if (field_)
+    field_->begin_frame(request.field_values, request.field_on_caps,
+                        mapped_surfaces(request.surfaces));
 }
 
 /// Puts labels into the groups of surfaces. Costs time if they are not those of the last frame.

@@ -20,7 +20,8 @@ DeviceStream make_stream(ocl::Device &device, const CompressedVolume &field,
 FieldWave::FieldWave(ocl::Device &device, const CompressedVolume &field,
                      std::span<const VolumeInfo> levels, const FieldPlan &plan,
                      std::uint32_t group_size, Wavefront &rays)
-    : blocks_(device, field, make_stream(device, field, plan), plan.cache, group_size),
+    : range_(known_range(field)),
+      blocks_(device, field, make_stream(device, field, plan), plan.cache, group_size),
       grid_(make_grid_params(field.info)),
       map_(make_field_map(levels, field.info)),
       values_(device, rays.num_rays, group_size, plan.cache.slot_type),
@@ -29,14 +30,24 @@ FieldWave::FieldWave(ocl::Device &device, const CompressedVolume &field,
   values_.set_map(map_);
 }
 
-void FieldWave::begin_frame(bool has_values, bool on_caps) {
+void FieldWave::begin_frame(bool has_values, bool on_caps, uint surfaces) {
   map_.caps_alone = on_caps ? 1 : 0;
+  map_.surfaces = surfaces;
   values_.set_map(map_);
+  layers_ = nullptr;
   if (has_values) rays_.field_values.fill(no_value());
   if (!blocks_.has_requests()) return;
   blocks_.cache.requested_bits.fill(0);
   blocks_.forget_requests();
   rays_.forget_rays();
+}
+
+void FieldWave::begin() {
+  begins_ = layers_ == nullptr;
+  if (begins_) return;
+  const auto stage = blocks_.device.timer().stage("field");
+  if (blocks_.has_requests()) rays_.forget_rays();
+  layers_->begin(rays_, rays_.hits);
 }
 
 void FieldWave::enqueue_pass() {

@@ -8,6 +8,7 @@
 #include "core/render/block_store.hpp"
 #include "core/render/wave.hpp"
 #include "core/stages/field_values.hpp"
+#include "core/stages/layers.hpp"
 
 namespace isowave::core {
 
@@ -25,9 +26,13 @@ class FieldWave : public Wave {
 
   /// A frame begins, which has no values yet.
   ///
-  /// Waits  if a frame before was stopped
-  void begin_frame(bool has_values, bool on_caps);
-  void begin() override { begins_ = true; }
+  /// surfaces  FieldMap::surfaces
+  /// Waits     if a frame before was stopped, or had another map
+  void begin_frame(bool has_values, bool on_caps, uint surfaces);
+  /// The next waves are of the hits of a further layer; null: of all rays. layers must outlive the
+  /// wave.
+  void set_layer(Layers *layers) { layers_ = layers; }
+  void begin() override;
   void enqueue_pass() override;
   BlockStore *own_blocks() override { return &blocks_; }
   LaterPasses *sum_in(FrameStats &stats) const override { return &stats.field; }
@@ -38,14 +43,18 @@ class FieldWave : public Wave {
   std::optional<std::array<float, 2>> range(std::size_t num_rays) {
     return values_.range(rays_, num_rays);
   }
+  /// As known_range() of the field.
+  std::optional<std::array<float, 2>> volume_range() const { return range_; }
 
  private:
+  std::optional<std::array<float, 2>> range_;
   BlockStore blocks_;
   FrameParams grid_;
   FieldMap map_;
   FieldValues values_;
   Wavefront &rays_;
-  bool begins_ = false;  ///< the next pass is the first
+  Layers *layers_ = nullptr;  ///< of set_layer()
+  bool begins_ = false;       ///< the next pass is the first of all rays
 };
 
 }  // namespace isowave::core

@@ -108,11 +108,11 @@ void LayerNormalsWave::begin() {
   layers_.begin(rays_, rays_.hits);
 }
 
-void SliceValuesWave::set_layer(bool is_first, std::uint32_t first_surface) {
+void SliceValuesWave::set_layer(bool is_first, uint surfaces) {
   is_first_layer_ = is_first;
   const VolumeInfo &volume = blocks_.levels[0].info;
   FieldMap map = make_field_map({&volume, 1}, volume);
-  map.first_surface = first_surface;
+  map.surfaces = surfaces;
   values_.set_map(map);
 }
 

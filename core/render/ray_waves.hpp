@@ -132,11 +132,11 @@ class SliceValuesWave : public Wave {
         layers_(layers),
         values_(blocks.device, rays.num_rays, group_size, blocks.cache.slot_type) {}
 
-  /// first_surface  the number of the first slice
-  void set_layer(bool is_first, std::uint32_t first_surface);
+  /// surfaces  FieldMap::surfaces, of the slices
+  void set_layer(bool is_first, uint surfaces);
   void begin() override;
   void enqueue_pass() override;
-  LaterPasses *sum_in(FrameStats &stats) const override { return &stats.field; }
+  LaterPasses *sum_in(FrameStats &stats) const override { return &stats.slices; }
 
  private:
   BlockStore &blocks_;

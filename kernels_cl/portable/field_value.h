@@ -23,7 +23,7 @@ typedef struct FieldMap {
   uint blocks_x, blocks_y;         ///< blocks of the finest level
   uint num_levels;                 ///< levels that may have hits
   uint caps_alone;                 ///< 0 or 1: hits that are no caps have no value
-  uint first_surface;              ///< hits of surfaces of lower numbers have no value
+  uint surfaces;                   ///< bit i: hits of the surface or slice of number i have values
   uint begin_z[ISO_FIELD_LEVELS];  ///< see LevelPlace
 } FieldMap;
 ISO_CHECK_SIZE(FieldMap, 144);
@@ -73,15 +73,18 @@ ISO_INLINE int field_cell(float p, uint dims, float *at) {
   return cell;
 }
 
+/// Is it a hit of one of the map's surfaces?
+ISO_INLINE int is_of_map(ISO_GLOBAL const FieldMap *m, HitRecord hit) {
+  return hit.t != INFINITY && (m->surfaces >> (hit.cell >> ISO_SURFACE_BIT) & 1u) != 0;
+}
+
 /// hit: its block's id is that of a frame of any levels of detail.
 ISO_INLINE FieldPlace field_place(ISO_GLOBAL const FieldMap *m, HitRecord hit) {
   FieldPlace place = {-1, -1, -1, {0.0f, 0.0f, 0.0f}};
   const uint layer = hit.block_id / m->blocks_x / m->blocks_y;
   uint level = 0;
   float x, y, z, scale;
-  if (hit.t == INFINITY || (m->caps_alone && (hit.cell & ISO_CAP) == 0) ||
-      hit.cell >> ISO_SURFACE_BIT < m->first_surface)
-    return place;
+  if (!is_of_map(m, hit) || (m->caps_alone && (hit.cell & ISO_CAP) == 0)) return place;
   while (level + 1 < m->num_levels && m->begin_z[level + 1] <= layer) ++level;
   /* Voxel k of a level lies where voxel 2k of the finer one does. */
   scale = (float)(1u << level);

@@ -38,10 +38,11 @@ typedef struct LayerParams {
   ClipParams slices;                        ///< their planes
   uint num_surfaces;
   uint whole_slices;            ///< bit i: clipping planes leave slice i whole
+  uint unmapped;                ///< bit i: colour maps leave surface i its own colour
   float low, scale;             ///< place of a voxel in the colour map: (value - low) * scale
   uint colors[ISO_MAP_COLORS];  ///< of slices
 } LayerParams;
-ISO_CHECK_SIZE(LayerParams, 1628);
+ISO_CHECK_SIZE(LayerParams, 1632);
 
 /// What a ray has seen so far.
 typedef struct RayColor {
@@ -144,11 +145,18 @@ ISO_INLINE int is_unseen(ISO_GLOBAL const LayerParams *layers, HitRecord hit, fl
   return is_of_slice(layers, hit) && is_no_data(value);
 }
 
+/// Has a hit a colour by its value in the colour map of slices, or of a field?
+ISO_INLINE int has_value_color(const ShadeParams *p, ISO_GLOBAL const LayerParams *layers,
+                               HitRecord hit) {
+  return is_of_slice(layers, hit) ||
+         (p->has_map == ISO_MAP_BY_FIELD && (layers->unmapped >> surface_of(hit) & 1u) == 0);
+}
+
 /// Blends a ray's next hit behind what it has seen.
 ///
 /// p          its surface colour is not used
 /// color_map  as surface_color()
-/// value      of the voxels at the hit; only read if it is on a slice
+/// value      at the hit, if has_value_color(): of the voxels on a slice, else of the field
 /// open, lit  as shade_ray()
 ISO_INLINE RayColor blend_hit(const FrameParams *frame, const ShadeParams *p,
                               ISO_GLOBAL const uint *color_map,
@@ -164,7 +172,8 @@ ISO_INLINE RayColor blend_hit(const FrameParams *frame, const ShadeParams *p,
     color.r = surface->r;
     color.g = surface->g;
     color.b = surface->b;
-    color = surface_color(frame, p, color_map, ray_id, hit.t, 0.0f, color);
+    if ((layers->unmapped >> surface_of(hit) & 1u) == 0)
+      color = surface_color(frame, p, color_map, ray_id, hit.t, value, color);
     color = shade_ray(frame, p, color, ray_id, hit.grad_x, hit.grad_y, hit.grad_z, open, lit);
   }
   share = seen.transmittance * surface->opacity;

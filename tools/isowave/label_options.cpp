@@ -46,22 +46,9 @@ std::vector<std::uint32_t> parse_labels(const std::string &text, std::string_vie
 
 /// index: of the surface in its frame
 isowave::Surface parse_group(const std::string &text, std::size_t index) {
-  const std::vector<std::string_view> fields = split_at_commas(text);
-  if (fields.size() > 4 || fields.front().empty() || fields.back().empty() ||
-      (fields.size() == 4 && fields[3] != "whole"))
-    throw Error(
-        "--labels {}: give LABELS, LABELS,COLOR, LABELS,COLOR,OPACITY or "
-        "LABELS,COLOR,OPACITY,whole",
-        text);
   isowave::Surface surface{.color = isowave::surface_color(index)};
-  surface.labels = parse_labels(text, fields[0]);
-  if (fields.size() > 1 && !fields[1].empty()) surface.color = parse_color("--labels", fields[1]);
-  if (fields.size() > 2 && !fields[2].empty()) {
-    const std::optional<double> opacity = parse_finite(fields[2]);
-    if (!opacity) throw Error("--labels {}: '{}' is no finite number", text, fields[2]);
-    surface.opacity = static_cast<float>(*opacity);
-  }
-  surface.clipped = fields.size() < 4;
+  const std::string_view labels = read_surface_fields("--labels", text, "LABELS", surface);
+  surface.labels = parse_labels(text, labels);
   return surface;
 }
 
@@ -74,7 +61,7 @@ void add_labels_option(CLI::App &command, std::vector<std::string> &texts) {
                   "surface is drawn together, and its colour and opacity as --surface has them; "
                   "repeat it for up to 8 surfaces in one picture. Voxels are integers, compressed "
                   "without a loss")
-      ->type_name("LABELS[,COLOR[,OPACITY[,whole]]]")
+      ->type_name("LABELS[,COLOR[,OPACITY[,whole][,own]]]")
       ->allow_extra_args(false);
 }
 

@@ -237,8 +237,7 @@ void check_options(const CLI::App &command, const RenderArgs &options, const Tea
     refuse_options(command, {"--color"}, "--color-by colours surfaces: leave out either");
   if (options.color_map.by_field) {
     if (team.size() > 1) throw Error("colours by a field: a team draws without them");
-    refuse_options(command, {"--surface", "--slice", "--time-budget"},
-                   "colours by a field are drawn of one opaque surface, without a time");
+    refuse_options(command, {"--time-budget"}, "colours by a field are drawn without a time");
   }
   if (options.transparent)
     refuse_options(command, {"--background"}, "pictures with --transparent have none");

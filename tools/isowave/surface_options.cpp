@@ -17,25 +17,19 @@ namespace isowave::core::tools {
 
 namespace {
 
+/// A field of an option. Throws Error if it is no number.
+double parse_field(const char *option, const std::string &text, std::string_view field) {
+  const std::optional<double> value = parse_finite(field);
+  if (!value || std::abs(*value) > std::numeric_limits<float>::max())
+    throw Error("{} {}: '{}' is no finite number that float32 holds", option, text, field);
+  return *value;
+}
+
 /// index: of the surface in its frame
 isowave::Surface parse_surface(const std::string &text, std::size_t index) {
-  const std::vector<std::string_view> fields = split_at_commas(text);
-  if (fields.size() > 4 || fields.front().empty() || fields.back().empty() ||
-      (fields.size() == 4 && fields[3] != "whole"))
-    throw Error(
-        "--surface {}: give VALUE, VALUE,COLOR, VALUE,COLOR,OPACITY or VALUE,COLOR,OPACITY,whole",
-        text);
-  const auto number = [&](std::string_view field) {
-    const std::optional<double> value = parse_finite(field);
-    if (!value || std::abs(*value) > std::numeric_limits<float>::max())
-      throw Error("--surface {}: '{}' is no finite number that float32 holds", text, field);
-    return *value;
-  };
-  isowave::Surface surface{.isovalue = number(fields[0]), .color = isowave::surface_color(index)};
-  if (fields.size() > 1 && !fields[1].empty()) surface.color = parse_color("--surface", fields[1]);
-  if (fields.size() > 2 && !fields[2].empty())
-    surface.opacity = static_cast<float>(number(fields[2]));
-  surface.clipped = fields.size() < 4;
+  isowave::Surface surface{.color = isowave::surface_color(index)};
+  const std::string_view value = read_surface_fields("--surface", text, "VALUE", surface);
+  surface.isovalue = parse_field("--surface", text, value);
   return surface;
 }
 
@@ -47,6 +41,29 @@ std::array<float, 3> parse_color(const char *option, std::string_view text) {
   } catch (const Error &error) {
     throw Error("{}: {}", option, error.what());
   }
+}
+
+std::string_view read_surface_fields(const char *option, const std::string &text, const char *what,
+                                     isowave::Surface &surface) {
+  const std::vector<std::string_view> fields = split_at_commas(text);
+  bool is_whole = false, is_own = false,
+       is_good = !fields.front().empty() && !fields.back().empty();
+  for (std::size_t i = 3; i < fields.size(); ++i) {
+    bool &is_set = fields[i] == "own" ? is_own : is_whole;
+    is_good = is_good && !is_set && (fields[i] == "own" || fields[i] == "whole");
+    is_set = true;
+  }
+  if (!is_good)
+    throw Error(
+        "{0} {1}: give {2}, {2},COLOR, {2},COLOR,OPACITY or {2},COLOR,OPACITY and whole, "
+        "own or both",
+        option, text, what);
+  if (fields.size() > 1 && !fields[1].empty()) surface.color = parse_color(option, fields[1]);
+  if (fields.size() > 2 && !fields[2].empty())
+    surface.opacity = static_cast<float>(parse_field(option, text, fields[2]));
+  surface.clipped = !is_whole;
+  surface.mapped = !is_own;
+  return fields.front();
 }
 
 void read_background(const std::string &text, isowave::Appearance &appearance) {
@@ -101,7 +118,8 @@ void add_color_map_options(CLI::App &command, ColorMapOptions &options) {
                   "or a direction; or by the values of a second volume at the hits: its file, or "
                   "`volume` to show the voxels of the same one on caps. LOW,HIGH: distances or "
                   "values of the first and the "
-                  "last colour [those of the volume's box, or of the field at the hits]")
+                  "last colour [those of the volume's box, or of the field at the hits; with "
+                  "--surface, of the whole field]")
       ->type_name("x|y|z|NX,NY,NZ|FILE|volume[,LOW,HIGH]");
   command.add_option("--color-map", options.map, "colours of --color-by")
       ->check(CLI::IsMember(isowave::color_map_names()))
@@ -193,8 +211,8 @@ void add_surface_option(CLI::App &command, std::vector<std::string> &texts) {
                   "500,skin,0.3 --surface 1150,bone. Colours: #RRGGBB, " +
                       color_names() +
                       " [a colour unlike the others'; opacity 1]. whole: clipping planes do not "
-                      "cut it")
-      ->type_name("VALUE[,COLOR[,OPACITY[,whole]]]")
+                      "cut it; own: --color-by leaves it its own colour")
+      ->type_name("VALUE[,COLOR[,OPACITY[,whole][,own]]]")
       ->allow_extra_args(false);
 }
 

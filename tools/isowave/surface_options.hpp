@@ -49,7 +49,17 @@ void add_color_map_options(CLI::App &command, ColorMapOptions &options);
 /// Throws  Error in one line: what the options cannot mean, for any volume
 void read_color_map(ColorMapOptions &options, isowave::Appearance &appearance);
 
-/// texts: VALUE[,COLOR[,OPACITY[,whole]]] each, as typed; read_surfaces() checks them.
+/// Sets colour, opacity, `clipped` and `mapped` of a surface.
+///
+/// option  --surface or --labels
+/// text    its value as typed: WHAT[,COLOR[,OPACITY[,WORD]...]], of words `whole` and `own`
+/// what    what the first field is, for errors
+/// Returns the first field
+/// Throws  Error in one line: what the others cannot mean
+std::string_view read_surface_fields(const char *option, const std::string &text, const char *what,
+                                     isowave::Surface &surface);
+
+/// texts: VALUE[,COLOR[,OPACITY[,whole][,own]]] each, as typed; read_surfaces() checks them.
 void add_surface_option(CLI::App &command, std::vector<std::string> &texts);
 
 /// Surfaces without a colour get surface_color().
@@ -57,7 +67,8 @@ void add_surface_option(CLI::App &command, std::vector<std::string> &texts);
 /// Throws  Error in one line: what the options cannot mean, for any volume
 std::vector<isowave::Surface> read_surfaces(const std::vector<std::string> &texts);
 
-/// [{isovalue, color, opacity, clipped}], or labels for isovalue; color: red, green, blue, 0 to 1.
+/// [{isovalue, color, opacity, clipped, mapped}], or labels for isovalue. color: red, green, blue,
+/// 0 to 1.
 nlohmann::ordered_json surfaces_json(const std::vector<isowave::Surface> &surfaces);
 
 }  // namespace isowave::core::tools

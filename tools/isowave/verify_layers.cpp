@@ -57,7 +57,12 @@ std::uint64_t verify_layers(const VerifyFramesOptions &options, ordered_json &do
     const Camera &camera = scene.cameras[view];
     std::vector<std::vector<HitRecord>> layers;
     if (all_layers) {
-      layers = twin->render_layers(camera, scene.size, surfaces, {}, Normals::kCell, clip).layers;
+      layers = twin->render_layers({.camera = camera,
+                                    .size = scene.size,
+                                    .clip = clip,
+                                    .surfaces = surfaces,
+                                    .normals = Normals::kCell})
+                   .layers;
     } else {
       FrameRequest request{.camera = camera, .clip = clip};
       request.surfaces = surfaces;

@@ -106,6 +106,7 @@ def scenes(run):
         {"surfaces": 1, "opacity": 1},
         {"surfaces": 2, "opacity": 1},
         {"surfaces": 2, "opacity": 1, "light": "0.5,1,0.7", "shadow": 1},
+        {"surfaces": 2, "opacity": 1, "values_of": True},
         *({"surfaces": n, "opacity": 0.3} for n in (1, 2, 4, 8)),
         {"surfaces": 2, "opacity": 0.3, "clip": CLIP},
     ]
@@ -113,7 +114,7 @@ def scenes(run):
     for field in run.fields()[:2]:
         for kind in kinds:
             if "values_of" in kind:
-                kind = {"values_of": run.volume(field)}
+                kind = kind | {"values_of": run.volume(field)}
             rows.append(frame_row(run, field, normals="smooth", rounds=2, **kind))
     return rows
 

@@ -77,7 +77,8 @@ struct Appearance {
   /// With color_by_field: caps have the field's colours, and surfaces their own.
   bool color_caps_alone = false;
   /// Distances, or values of the field, of the first and the last colour; none: the least and the
-  /// largest of the volume's box [world units], or of the field at the frame's hits.
+  /// largest of the volume's box [world units], or of the field at the frame's hits. In frames of
+  /// several or translucent surfaces, that is Volume::value_range() of the field.
   std::optional<double> color_low{}, color_high{};
   std::string slice_map = "gray";  ///< name of the colour map of FrameRequest::slices
   std::vector<std::array<float, 3>> slice_table{};  ///< 256 colours instead of slice_map
@@ -128,6 +129,7 @@ struct Surface {
   std::array<float, 3> color = Appearance{}.surface;  ///< sRGB, 0 to 1
   float opacity = 1;    ///< of each crossing, above 0; 1: nothing behind it is seen
   bool clipped = true;  ///< false: clipping planes leave it whole
+  bool mapped = true;   ///< false: color_map and color_table leave it its own colour
   /// Labels of a segmentation, 0 to 65,535, instead of `isovalue`: the surface is that of their
   /// indicator, which is 1 at voxels with one of them and 0 at the others, at 0.5. A
   /// device needs RendererOptions::with_labels. Surfaces may have labels in common.
@@ -197,7 +199,8 @@ struct FrameRequest {
   // Arrays that the frame brings to the host.
   bool want_picture = true;
   bool want_depth = false, want_normals = false, want_positions = false, want_hits = false;
-  bool want_field = false;   ///< values of the renderer's field; needs RendererOptions::field
+  /// Values of the renderer's field, at hits of one opaque surface; needs RendererOptions::field.
+  bool want_field = false;
   bool want_bounds = false;  ///< bounds of each pixel's error; needs RendererOptions::with_bounds
 
   /// Called after each pass, also those for smooth normals, a field, ambient and shadow rays; on
@@ -247,6 +250,7 @@ void for_each_surface_field(AnySurface &surface, const Visit &visit) {
   visit("color", surface.color);
   visit("opacity", surface.opacity);
   visit("clipped", surface.clipped);
+  visit("mapped", surface.mapped);
 }
 
 /// Calls visit(name, field) for each field of a slice.
@@ -333,7 +337,8 @@ struct FrameStatistics {
   std::uint32_t ambient_passes = 0;          ///< those of `passes` for ambient and shadow rays
   double ambient_ms = 0;                     ///< part of total_ms
   double field_ms = 0;                       ///< part of total_ms, for values of a field
-  /// The least and the largest value of the field at the hits; none: there is no value.
+  /// The least and the largest value of the field at the hits; none: there is no value, or there
+  /// are several or translucent surfaces.
   std::optional<std::array<float, 2>> field_range{};
   /// The values of the first and the last colour: distances along Appearance::color_axis, or values
   /// of the field. None: there is no colour map, or no value.

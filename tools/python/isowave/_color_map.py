@@ -30,7 +30,8 @@ class ColorMap:
     colors: str | npt.ArrayLike = "viridis"
     axis: str | Sequence[float] = "z"  #: "x", "y", "z", or a direction in world space
     #: Distances of the first and the last colour [world units]; None: those of the volume's box.
-    #: By a field, values; None: the least and the largest at the hits.
+    #: By a field, values; None: the least and the largest at the hits, or with several or
+    #: translucent surfaces, of the field.
     range: tuple[float, float] | None = None
     #: "axis"; "field": hits without a value have the surface's own colour; "caps": caps show the
     #: field, the volume itself unless there is another, and surfaces have their own colour

@@ -82,12 +82,13 @@ class Scene:
         opacity: float = 1.0,
         *,
         clipped: bool = True,
+        mapped: bool = True,
     ) -> Scene:
         """The scene with one more surface, up to 8; arguments as Surface.
 
         isovalue: "auto" is the first of Volume.suggested_isovalues().
         """
-        more = Surface(self.volume._isovalue(isovalue), color, opacity, clipped)
+        more = Surface(self.volume._isovalue(isovalue), color, opacity, clipped, mapped=mapped)
         return replace(self, surfaces=(*self.surfaces, more))
 
     def labels(
@@ -97,11 +98,11 @@ class Scene:
         opacity: float = 1.0,
         *,
         clipped: bool = True,
+        mapped: bool = True,
     ) -> Scene:
         """The scene with one more surface, that of a label or of several; arguments as Surface."""
-        return replace(
-            self, surfaces=(*self.surfaces, Surface(None, color, opacity, clipped, labels))
-        )
+        more = Surface(None, color, opacity, clipped, labels, mapped)
+        return replace(self, surfaces=(*self.surfaces, more))
 
     def slice(
         self,
@@ -148,6 +149,7 @@ class Scene:
             first is not None
             and first.opacity == 1
             and first.clipped
+            and first.mapped
             and first.isovalue is not None
         ):
             # One opaque surface is drawn with whatever Renderer.render() offers.

@@ -65,6 +65,7 @@ def open_scene(
                 each["opacity"],
                 each["clipped"],
                 tuple(each.get("labels", ())),
+                each["mapped"],
             )
             for each in fields["surfaces"]
         ),

@@ -36,6 +36,7 @@ class Surface:
     opacity: float = 1.0  #: of each crossing, above 0; at 1, nothing behind the surface is seen
     clipped: bool = True  #: False: clipping planes leave it whole
     labels: int | Sequence[int] = ()  #: instead of an isovalue
+    mapped: bool = True  #: False: color_map leaves it its own colour
 
     @property
     def values(self) -> list[float]:
@@ -105,4 +106,5 @@ def surface_of(surface: object, index: int) -> Surface:
         number("Surface.opacity", surface.opacity),
         flag("Surface.clipped", surface.clipped),
         labels,
+        flag("Surface.mapped", surface.mapped),
     )

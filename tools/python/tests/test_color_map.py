@@ -1,5 +1,7 @@
 """Surfaces coloured by the distance along an axis."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from conftest import FUEL
@@ -125,6 +127,36 @@ def test_volumes_are_drawn_by_a_field_at_once(volume):
     assert volume.render(6, size=SIZE).field is None and volume._renderer is kept
     with pytest.raises(isowave.Error, match="field=VOLUME"):
         isowave.compress(np.zeros((4, 4, 4), np.float32)).render(0, color_map=by_field)
+
+
+def test_a_field_colours_several_surfaces(volume):
+    field = field_of(volume)
+    (low, *_), (high, *_) = volume.box  # the field's values
+    by_field = isowave.ColorMap("gray", by="field")
+    skin, bone = isowave.Surface(4, "skin", 0.4), isowave.Surface(8, "bone")
+    own = [replace(each, mapped=False) for each in (skin, bone)]
+
+    def draw(surfaces, **more):
+        image = volume.render(surfaces=surfaces, size=SIZE, field=field, **more)
+        return image.rgb.tobytes(), image
+
+    pictures = set()
+    for surfaces in ([skin, bone], [own[0], bone], own):
+        drawn = [draw(surfaces, device=name, color_map=by_field) for name in ("cpu", "host")]
+        assert drawn[0][0] == drawn[1][0]
+        assert drawn[0][1].statistics["color_range"] == pytest.approx((low, high))
+        pictures.add(drawn[0][0])
+    assert len(pictures) == 3
+    assert drawn[0][0] == draw(own)[0]
+    given = replace(by_field, range=(low, high))
+    assert draw([skin, bone], color_map=given)[0] in pictures
+    wider = replace(given, range=(low, high + 9))
+    assert draw([skin, bone], color_map=wider)[0] not in pictures
+    with pytest.raises(isowave.Error, match="values of a field are those of one opaque surface"):
+        draw(own, color_map=by_field, outputs=("rgb", "field"))
+    scene = volume.scene().surface(4, "skin", 0.4, mapped=False).surface(8, "bone")
+    image = scene.look(field=field, color_map=by_field).render(size=SIZE)
+    assert image.rgb.tobytes() == draw([own[0], bone], color_map=by_field)[0]
 
 
 def test_caps_show_the_voxels(volume):

@@ -197,12 +197,19 @@ def test_surfaces_have_colors_and_give_the_isovalue() -> None:
     assert request.isovalue == 2 and request.isovalues == [2, 3]
     assert dataclasses.replace(request, samples=2).surfaces == request.surfaces
     assert request.for_core()["surfaces"] == [
-        {"isovalue": 2, "color": (1, 128 / 255, 0), "opacity": 0.5, "clipped": True},
+        {
+            "isovalue": 2,
+            "color": (1, 128 / 255, 0),
+            "opacity": 0.5,
+            "clipped": True,
+            "mapped": True,
+        },
         {
             "isovalue": 3,
             "color": (0x56 / 255, 0xB4 / 255, 0xE9 / 255),
             "opacity": 1,
             "clipped": True,
+            "mapped": True,
         },
     ]
     assert Request(7).isovalues == [7]

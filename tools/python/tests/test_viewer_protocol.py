@@ -154,10 +154,6 @@ BAD_WISHES: list[tuple[dict[str, Any], str]] = [
     ({**PLAIN, "surfaces": [SURFACE], "time_budget": 9}, "are drawn without time_budget"),
     ({**PLAIN, "surfaces": [SURFACE], "ambient": 8}, "ambient needs a surface of opacity 1"),
     ({**PLAIN, "surfaces": [SURFACE], **LIT}, "shadow needs a surface of opacity 1"),
-    (
-        {**PLAIN, "surfaces": [SURFACE], "color_map": {**COLOR_MAP, "by": "caps"}},
-        "colours by the field are drawn without surfaces",
-    ),
     ({"color": [0, 0, 1.01]}, "color"),
     ({"background": [0, 0]}, "background"),
     ({"max_error": 0}, "max_error"),

@@ -324,11 +324,11 @@ def test_colours_are_by_the_field(open_page: Callable[..., Any]) -> None:  # noq
         fields = isowave._core.parse_scene(text)
         assert fields["field"] == "heat.zfp" and fields["color_by_field"]
         assert (fields["color_low"], fields["color_high"]) == (1, 9)
-        # Several surfaces have their own colours.
+        # Several surfaces have these colours, too.
         page.get_by_role("button", name="Add surface").click()
         request = asked(page, volume)
-        assert len(request.surfaces) == 2 and request.color_map is None
-        assert not isowave._core.parse_scene(saved_scene(page))["color_by_field"]
+        assert len(request.surfaces) == 2 and request.color_map == ranged
+        assert isowave._core.parse_scene(saved_scene(page))["color_by_field"]
         open_scene(page, text)
         assert asked(page, volume).color_map == ranged
         by.select_option("caps")

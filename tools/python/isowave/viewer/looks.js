@@ -59,10 +59,9 @@ export function lightOf({ eye, at, up }) {
   return unit(add(back, cross(back, right)));
 }
 
-/** What a wish says of colours and lights. Only one opaque surface has the colours of a field. */
+/** What a wish says of colours and lights. */
 export function lookOf({ surfaces, color_map: map, lights, light, shadow }) {
-  const isAlone = isPlain(surfaces);
-  return { color_map: isAlone || map?.by === "axis" ? map : null, lights, light,
+  return { color_map: map, lights, light,
     shadow: hasOpaque(surfaces) && light ? shadow : null };
 }
 

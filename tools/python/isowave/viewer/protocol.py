@@ -20,8 +20,8 @@ looks nowhere.
     {"type": "scene", "text": "a scene file's"}
 
 Without surfaces, one opaque surface is drawn, of the wish's isovalue and color. Surfaces come in
-place of these, and without max_error, time_budget and colours by the field. Ambient rays and shadow
-need one of opacity 1.
+place of these, and without max_error and time_budget. Ambient rays and shadow need one of opacity
+1.
 
 Answers are dicts with a "type": welcome, status, histogram, picture (with bytes), bounds, scene,
 error;
@@ -348,9 +348,8 @@ def _read_wish(content: dict[str, Any]) -> Wish:
     surfaces, color = _surfaces(content), _triple(content["color"], 0, 1, "color")
     color_map = _color_map(content["color_map"])
     by_field = color_map is not None and color_map.by != "axis"
-    if by_field and (surfaces or time_budget is not None):
-        without = "surfaces" if surfaces else "time_budget"
-        raise ProtocolError(f"colours by the field are drawn without {without}")
+    if by_field and time_budget is not None:
+        raise ProtocolError("colours by the field are drawn without time_budget")
     request = Request(
         isovalue=_number(content["isovalue"], -MAX_FLOAT32, MAX_FLOAT32, "isovalue"),
         camera=_camera(content["camera"]),

@@ -51,6 +51,9 @@ export function readScene(fields, hasField) {
   if (fields.surfaces.some(({ clipped }) => clipped === false)) {
     throw new Error('This page cuts all surfaces: leave out "clipped".');
   }
+  if (fields.surfaces.some(({ mapped }) => mapped === false)) {
+    throw new Error('This page gives all surfaces the map\'s colours: leave out "mapped".');
+  }
   if (fields.background_top) throw new Error("This page shows no gradient as background.");
   if (fields.color_table?.length) throw new Error("This page shows no tables of colours.");
   if (typeof low === "number" && !(Math.max(Math.abs(low), Math.abs(fields.color_high)) <= 1e18)) {
