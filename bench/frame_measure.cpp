@@ -37,7 +37,9 @@ std::vector<ViewTimes> measure_views(DeviceRenderer &renderer, const std::vector
   const auto draw = [&](const Camera &camera) {
     const auto begin = std::chrono::steady_clock::now();
     TimedFrame frame{renderer.render(seen_from(camera, request))};
-    arrays = renderer.fetch(wanted, request.light);
+    Appearance shown = request.light;
+    if (!request.surfaces.empty()) shown.color_by_field.reset();  // their colours are blended
+    arrays = renderer.fetch(wanted, shown);
     frame.arrays_ms = ms_since(begin);
     return frame;
   };

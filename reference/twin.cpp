@@ -122,32 +122,60 @@ class LayerLight {
   std::vector<Caster> casters_;
 };
 
+/// rays_cut is left out.
+LayerStats stats_of(const std::vector<std::vector<HitRecord>> &layers) {
+  LayerStats stats;
+  const auto is_hit = [](const HitRecord &hit) { return std::isfinite(hit.t); };
+  for (const std::vector<HitRecord> &layer : layers) {
+    const auto hits = static_cast<std::uint64_t>(std::ranges::count_if(layer, is_hit));
+    stats.hits += hits;
+    if (hits != 0) ++stats.layers;
+  }
+  return stats;
+}
+
+/// The place of the list whose next hit, its last, is nearest; left.size(): none has one.
+std::size_t nearest_of(const std::vector<std::vector<HitRecord>> &left) {
+  std::size_t nearest = left.size();
+  for (std::size_t k = 0; k < left.size(); ++k) {
+    if (left[k].empty()) continue;
+    if (nearest == left.size() || left[k].back().t < left[nearest].back().t) nearest = k;
+  }
+  return nearest;
+}
+
+/// The frame of each surface, in that order.
+std::vector<FrameParams> frames_of(const FrameRequest &request, const VolumeInfo &finest,
+                                   const std::vector<std::uint32_t> &order) {
+  std::vector<FrameParams> frames;
+  frames.reserve(order.size());
+  for (const std::uint32_t surface : order)
+    frames.push_back(make_frame_params(finest, request.camera, *request.size,
+                                       request.surfaces[surface].isovalue));
+  return frames;
+}
+
 }  // namespace
 
 LayeredFrame Twin::render_layers(const FrameRequest &request, const FieldTwin *field) const {
   const std::vector<SurfaceStyle> &surfaces = request.surfaces;
-  const Slices &slices = request.slices;
   const LightRays light_rays = light_rays_of(request);
-  check_surfaces(surfaces, slices);
+  check_surfaces(surfaces, request.slices);
   const std::vector<std::uint32_t> order = innermost_first(surfaces);
-  std::vector<FrameParams> frames;  // in that order
-  frames.reserve(order.size());
-  for (const std::uint32_t surface : order)
-    frames.push_back(
-        make_frame_params(levels_[0], request.camera, *request.size, surfaces[surface].isovalue));
-  const ClipParams clip =
-      make_clip_params(levels_[0], frames[0].view, request.camera, request.clip);
+  const VolumeInfo &finest = levels_[0];
+  const std::vector<FrameParams> frames = frames_of(request, finest, order);
+  const ClipParams clip = make_clip_params(finest, frames[0].view, request.camera, request.clip);
   const bool has_field = field != nullptr && request.field_values;
   const Shading shading =
-      make_layer_shading(levels_[0], request, has_field ? field->volume_range() : std::nullopt);
+      make_layer_shading(finest, request, has_field ? field->volume_range() : std::nullopt);
   const LayerParams colors =
-      make_layer_params(surfaces, slices, levels_[0], frames[0].view, request.camera);
-  LayerLight lights(light_rays, levels_[0], voxels_[0]);
+      make_layer_params(surfaces, request.slices, finest, frames[0].view, request.camera);
+  LayerLight lights(light_rays, finest, voxels_[0]);
   for (std::size_t k = 0; k < order.size(); ++k) {
     const SurfaceStyle &surface = surfaces[order[k]];
     if (surface.opacity == 1) lights.add({frames[k], surface.clipped ? clip : ClipParams{}});
   }
-  const FieldMap map = make_field_map({levels_.data(), 1}, levels_[0]);
+  const FieldMap map = make_field_map({&finest, 1}, finest);
   const uint num_slices = colors.slices.num_planes;
   const std::size_t num_rays = request.size->num_rays();
   LayeredFrame result;
@@ -171,17 +199,9 @@ LayeredFrame Twin::render_layers(const FrameRequest &request, const FieldTwin *f
       std::ranges::reverse(left.back());
       for (HitRecord &hit : left.back()) hit = with_surface(hit, order[k]);
     }
-    const auto find_nearest = [&] {
-      std::size_t nearest = left.size();
-      for (std::size_t k = 0; k < left.size(); ++k) {
-        if (left[k].empty()) continue;
-        if (nearest == left.size() || left[k].back().t < left[nearest].back().t) nearest = k;
-      }
-      return nearest;
-    };
     RayColor &color = result.colors[i];
     for (std::size_t layer = 0; goes_on(color); ++layer) {
-      const std::size_t nearest = find_nearest();
+      const std::size_t nearest = nearest_of(left);
       if (nearest == left.size()) break;
       if (layer == ISO_MAX_LAYERS) {
         cut[i] = 1;
@@ -192,9 +212,9 @@ LayeredFrame Twin::render_layers(const FrameRequest &request, const FieldTwin *f
       if (request.normals == Normals::kSmooth) smooth_gradients(frames[0], voxels_[0], {&hit, 1});
       float value = no_value();
       if (is_of_slice(&colors, hit)) {
-        value = value_at_hit(map, levels_[0].dims, voxels_[0], hit);
+        value = value_at_hit(map, finest.dims, voxels_[0], hit);
       } else if (has_field) {
-        value = field->values({levels_.data(), 1}, {&hit, 1}, request.field_on_caps)[0];
+        value = field->values({&finest, 1}, {&hit, 1}, request.field_on_caps)[0];
       }
       if (is_unseen(&colors, hit, value)) continue;
       result.layers[layer][i] = hit;
@@ -206,12 +226,7 @@ LayeredFrame Twin::render_layers(const FrameRequest &request, const FieldTwin *f
                         open_share(open.data(), 1, light_rays.num_shadow), color);
     }
   });
-  const auto is_hit = [](const HitRecord &hit) { return std::isfinite(hit.t); };
-  for (const std::vector<HitRecord> &layer : result.layers) {
-    const auto hits = static_cast<std::uint64_t>(std::ranges::count_if(layer, is_hit));
-    result.stats.hits += hits;
-    if (hits != 0) ++result.stats.layers;
-  }
+  result.stats = stats_of(result.layers);
   result.stats.rays_cut = static_cast<std::uint64_t>(std::ranges::count(cut, 1));
   return result;
 }
