@@ -105,6 +105,7 @@ FrameArrays TwinRenderer::fetch(const WantedArrays &wanted, const Appearance &ap
 }
 
 std::optional<std::array<float, 2>> TwinRenderer::field_range() {
+  if (!colors_.empty() && field_) return field_->volume_range();
   return range_of_values(field_values_);
 }
 

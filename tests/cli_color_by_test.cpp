@@ -104,6 +104,8 @@ TEST_F(CliColorBy, AFieldColoursSeveralSurfaces) {
   EXPECT_EQ(draw_all("bone,0.4,own --surface 90,skin,1,own --device host" + by),
             draw_all("bone,0.4 --surface 90,skin --device host"));
   EXPECT_EQ(pictures.size(), 4u);
+  pictures.insert(draw_all(all[0] + " --device host --annotate color-bar"));
+  EXPECT_EQ(pictures.size(), 5u) << "there is no colour bar";
 }
 
 TEST_F(CliColorBy, AnAxisStaysOneIfAFileHasItsName) {

@@ -12,7 +12,6 @@
 #include "core/api/volume_implementation.hpp"
 #include "core/base/ms_since.hpp"
 #include "core/frame/colors.hpp"
-#include "core/frame/field_values.hpp"
 #include "core/io/file_name.hpp"
 #include "core/zfp/isovalue.hpp"
 
@@ -125,14 +124,13 @@ void Renderer::Implementation::fetch(const FrameRequest &request, Frame &frame) 
                                   request.want_positions, request.want_field};
   // Without a picture, nothing needs colours, nor the values that they are by.
   core::Appearance appearance = core_appearance(request.appearance, whole());
-  std::optional<std::array<float, 2>> range;
-  if (renderer_->has_field_values()) {
-    range = frame.statistics.field_range = renderer_->field_range();
-  } else if (request.want_picture && !request.surfaces.empty() && field) {
-    range = core::known_range(field->implementation().volume);
-  }
+  const auto range = renderer_->field_range();
   frame.statistics.color_range = range_of_colors(appearance, range);
-  if (!renderer_->has_field_values()) appearance.color_by_field.reset();
+  if (renderer_->has_field_values()) {
+    frame.statistics.field_range = range;
+  } else {
+    appearance.color_by_field.reset();
+  }
   move_arrays(renderer_->fetch(wanted, appearance), frame);
   if (request.want_hits)
     frame.hits = public_hits(renderer_->hits(), volume_, renderer_->abilities().levels);

@@ -116,7 +116,8 @@ class Renderer {
   virtual std::vector<HitRecord> hits() = 0;
   /// Whether the last frame had FrameRequest::field_values.
   virtual bool has_field_values() const { return false; }
-  /// The least and the largest value of the field at the hits of the last frame; none if no hit has
+  /// The least and the largest value of the field at the hits of the last frame, or in frames of
+  /// several or translucent surfaces, of the field. None: they are not known, or no hit has
   /// one.
   virtual std::optional<std::array<float, 2>> field_range() { return {}; }
   /// Number of rays that hit, for the frame with those statistics.

@@ -372,6 +372,7 @@ void HostRenderer::add_field_values(const FrameRequest &request, FrameStats &sta
 
 std::optional<std::array<float, 2>> HostRenderer::field_range() {
   check_has_picture();
+  if (!colors_.empty() && field_) return field_->volume_range();
   return range_of_values(field_values_);
 }
 

@@ -451,6 +451,7 @@ void DeviceRenderer::set_hits(std::span<const HitRecord> hits) {
 
 std::optional<std::array<float, 2>> DeviceRenderer::field_range() {
   check_has_picture();
+  if (has_layers_ && field_) return field_->volume_range();
   if (!has_field_values_) return {};
   return field_->range(size_.num_rays());
 }
