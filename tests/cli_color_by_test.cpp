@@ -140,7 +140,6 @@ TEST_F(CliColorBy, WhatItCannotMeanIsRefused) {
   expect_one_line_error("render " + kHead + "--color-by volume,1,1", "two numbers that differ");
   expect_one_line_error("render " + kHead + "--color-by missing.nrrd", "volume or a file");
   expect_one_line_error("render " + kHead + "--color-by volume --time-budget 9", "--time-budget");
-  expect_one_line_error("render " + kVolume + " --surface 80,bone --color-by volume", "--surface");
   expect_one_line_error("render " + kHead + "--color-by z --color '#102030'", "--color");
 }
 
