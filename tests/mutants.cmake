@@ -111,7 +111,8 @@ add_predicate_mutant(sure_position
 add_library(device_mutant_main OBJECT device_mutant_main.cpp)
 target_link_libraries(device_mutant_main PRIVATE isowave_reference)
 
-# add_device_mutant(<name> <pipelines that leak> <file> <line as it stands> <line with the bug>)
+# add_device_mutant(<name> <pipelines that leak> <file> <line as it stands> <line with the bug>
+# [CONFIGURATIONS Long]). Each compiles all kernels of its pipelines.
 function(add_device_mutant name pipelines file from to)
   set(mutant device_${name})
   set(folder ${CMAKE_CURRENT_BINARY_DIR}/mutants/${mutant})
@@ -126,7 +127,7 @@ function(add_device_mutant name pipelines file from to)
   add_executable(mutant_${mutant} $<TARGET_OBJECTS:device_mutant_main> ${folder}/kernels.cpp)
   target_link_libraries(mutant_${mutant} PRIVATE isowave_reference)
   set_target_properties(mutant_${mutant} PROPERTIES EXPORT_COMPILE_COMMANDS OFF)
-  add_test(NAME mutant.${mutant} COMMAND mutant_${mutant} ${pipelines})
+  add_test(NAME mutant.${mutant} COMMAND mutant_${mutant} ${pipelines} ${ARGN})
   set_tests_properties(mutant.${mutant} PROPERTIES ENVIRONMENT ISOWAVE_DEVICE=cpu TIMEOUT 300)
 endfunction()
 
@@ -135,14 +136,15 @@ add_device_mutant(none_at_all "rays;packets;blocks" macrocells.cl
 set_tests_properties(mutant.device_none_at_all PROPERTIES WILL_FAIL TRUE)
 add_device_mutant(own_voxels_only "rays;packets;blocks" macrocells.cl
   "    range = join(range, (corner & 4 ?"
-  "    if (corner == 0) range = join(range, (corner & 4 ?")
+  "    if (corner == 0) range = join(range, (corner & 4 ?" CONFIGURATIONS Long)
 add_device_mutant(half_of_macrocells "rays;blocks" device/block_walk.h
   "(bit < 32 ? low >> bit : high >> (bit - 32)) & 1u" "(bit < 32 ? low >> bit : 0u) & 1u")
-add_device_mutant(lost_results blocks device/closest_pair.h "atomic_min(" "atomic_max(")
+add_device_mutant(lost_results blocks device/closest_pair.h "atomic_min(" "atomic_max("
+  CONFIGURATIONS Long)
 add_device_mutant(half_of_blocks packets portable/packet_regions.h
   "pick(level->place < 32, level->low, level->high)"
   "pick(level->place < 32, level->low, ints(0))")
 add_device_mutant(one_crossing_of_packets packets portable/packet_walk.h
-  "lanes & ((in0 ^ in1) | (in0 ^ in2) | (in0 ^ in3))" "lanes & (in0 ^ in3)")
+  "lanes & ((in0 ^ in1) | (in0 ^ in2) | (in0 ^ in3))" "lanes & (in0 ^ in3)" CONFIGURATIONS Long)
 add_device_mutant(narrow_way packets portable/packet_walk.h
-  "pick(a->up, to, place[axis]) & 3" "place[axis] & 3")
+  "pick(a->up, to, place[axis]) & 3" "place[axis] & 3" CONFIGURATIONS Long)
