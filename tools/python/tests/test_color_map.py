@@ -133,7 +133,7 @@ def test_a_field_colours_several_surfaces(volume):
     field = field_of(volume)
     (low, *_), (high, *_) = volume.box  # the field's values
     by_field = isowave.ColorMap("gray", by="field")
-    skin, bone = isowave.Surface(4, "skin", 0.4), isowave.Surface(8, "bone")
+    skin, bone = isowave.Surface(8, "skin", 0.4), isowave.Surface(4, "bone")
     own = [replace(each, mapped=False) for each in (skin, bone)]
 
     def draw(surfaces, **more):
@@ -154,7 +154,7 @@ def test_a_field_colours_several_surfaces(volume):
     assert draw([skin, bone], color_map=wider)[0] not in pictures
     with pytest.raises(isowave.Error, match="values of a field are those of one opaque surface"):
         draw(own, color_map=by_field, outputs=("rgb", "field"))
-    scene = volume.scene().surface(4, "skin", 0.4, mapped=False).surface(8, "bone")
+    scene = volume.scene().surface(8, "skin", 0.4, mapped=False).surface(4, "bone")
     image = scene.look(field=field, color_map=by_field).render(size=SIZE)
     assert image.rgb.tobytes() == draw([own[0], bone], color_map=by_field)[0]
 
