@@ -114,7 +114,7 @@ class Renderer {
   std::vector<float> depth() { return fetch({.depth = true}, {}).depth.copy(); }
   /// [size.ray_rows()][size.ray_columns()], row 0 at the top.
   virtual std::vector<HitRecord> hits() = 0;
-  /// Whether the last frame had FrameRequest::field_values.
+  /// Whether the last frame had FrameRequest::field_values, and no FrameRequest::surfaces.
   virtual bool has_field_values() const { return false; }
   /// The least and the largest value of the field at the hits of the last frame, or in frames of
   /// several or translucent surfaces, of the field. None: they are not known, or no hit has

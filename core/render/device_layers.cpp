@@ -143,7 +143,6 @@ LayerCounts DeviceRenderer::draw_layer(std::uint32_t layer, const FrameRequest &
   if (is_drawn && !request.slices.planes.empty()) {
     slice_values_->set_layer(!is_further, ~0u << request.surfaces.size());
     run(*slice_values_, frame);
-    if (frame.stats.cancelled) rays_.field_values.fill(no_value());
   }
   const bool previews = !is_further && frame.on_pass && (is_smooth || is_lit || has_field);
   if (previews) layers_->blend(rays_, true, ISO_PREVIEWS);
@@ -151,9 +150,9 @@ LayerCounts DeviceRenderer::draw_layer(std::uint32_t layer, const FrameRequest &
   if (has_field) {
     field_->set_layer(is_further ? &*layers_ : nullptr);
     run(*field_, frame);
-    // Blends see what the last layer had otherwise.
-    if (frame.stats.cancelled) rays_.field_values.fill(no_value());
   }
+  // Hits of a stopped frame may have the values of the layer before. The first layer has none.
+  if (is_further && frame.stats.cancelled) rays_.field_values.fill(no_value());
   if (is_lit) light_layer(request, clip, isovalues, frame);
   if (previews) layers_->clear(rays_);
   const LayerCounts counts =

@@ -78,7 +78,7 @@ struct Appearance {
   bool color_caps_alone = false;
   /// Distances, or values of the field, of the first and the last colour; none: the least and the
   /// largest of the volume's box [world units], or of the field at the frame's hits. In frames of
-  /// several or translucent surfaces, that is Volume::value_range() of the field.
+  /// several or translucent surfaces, a field's are those of its Volume::value_range().
   std::optional<double> color_low{}, color_high{};
   std::string slice_map = "gray";  ///< name of the colour map of FrameRequest::slices
   std::vector<std::array<float, 3>> slice_table{};  ///< 256 colours instead of slice_map
