@@ -6,7 +6,6 @@
 /// If a frame has several surfaces, the hits of each layer have such rays. A ray may meet each of
 /// the opaque surfaces: it goes through pipeline `rays` once for each, and ambient_block takes out
 /// what has met one.
-#define ISO_FOUND local
 #include "device/level_borders.h"
 #include "portable/ambient.h"
 #include "portable/clip.h"

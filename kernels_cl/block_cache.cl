@@ -14,7 +14,7 @@
 /// wait for the next. (Not in the paper, whose cache grows instead.)
 #include "device/block_requests.h"
 #include "device/ray_pairs.h"
-#include "device/slot_values.h"
+#include "portable/label_table.h"
 
 #define ISO_SPARE_PART 16u  ///< one slot of so many may be freed beyond need
 
@@ -319,18 +319,52 @@ kernel void cache_rebuild(const FrameParams frame_params, global const PassCount
   }
 }
 
-/// For another isovalue: which voxels of the cached blocks are inside. Grid-stride over slots and
-/// table.
-kernel void cache_classify(const FrameParams frame_params, uint num_slots,
-                           global const uint *slot_block_ids, global const SlotValue *cache_values,
-                           global ulong *inside, global BlockEntry *table) {
+/// Which of a slot's values, which have this type, are not below the isovalue.
+#define ISO_NOT_BELOW(type)                   \
+  for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v) \
+  bits |= (ulong)((float)((global const type *)values)[v] - isovalue >= 0.0f) << v
+
+/// For another isovalue: which voxels of the cached blocks are inside. The type of slots is an
+/// argument, or all kernels of this file would be compiled anew for each type.
+///
+/// slot_type    ISO_SLOTS_*
+/// cache_words  slots of ISO_BLOCK_VOXELS values
+/// Launch       grid-stride over slots and table
+kernel void cache_classify(const FrameParams frame_params, uint num_slots, uint slot_type,
+                           global const uint *slot_block_ids,
+                           global const ISO_WORDS(SlotValue) *cache_words, global ulong *inside,
+                           global BlockEntry *table) {
   const FrameParams *frame = &frame_params;
+  const float isovalue = frame->surface.isovalue;
+  const uint value_bytes = slot_type == ISO_SLOTS_FLOAT32                                  ? 4
+                           : slot_type == ISO_SLOTS_UINT16 || slot_type == ISO_SLOTS_INT16 ? 2
+                                                                                           : 1;
   for (uint slot = get_global_id(0); slot < num_slots; slot += get_global_size(0)) {
     if (slot_block_ids[slot] != ISO_INVALID_ID) {
+      global const uint *values = cache_words + slot * (ISO_BLOCK_VOXELS / 4 * value_bytes);
       ulong bits = 0;
-      for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v) {
-        const float value = field_of_slot(frame, cache_values[slot * ISO_BLOCK_VOXELS + v]);
-        bits |= (ulong)(value - frame->surface.isovalue >= 0.0f) << v;
+      switch (slot_type) {
+        case ISO_SLOTS_FLOAT32:
+          ISO_NOT_BELOW(float);
+          break;
+        case ISO_SLOTS_UINT8:
+          ISO_NOT_BELOW(uchar);
+          break;
+        case ISO_SLOTS_INT8:
+          ISO_NOT_BELOW(char);
+          break;
+        case ISO_SLOTS_UINT16:
+          ISO_NOT_BELOW(ushort);
+          break;
+        case ISO_SLOTS_INT16:
+          ISO_NOT_BELOW(short);
+          break;
+        default:
+          for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v) {
+            const uint groups = ((global const uchar *)values)[v];
+            bits |= (ulong)(group_field(groups, frame->surface.isovalue_index) - isovalue >= 0.0f)
+                    << v;
+          }
       }
       inside[slot] = bits;
     }

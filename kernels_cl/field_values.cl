@@ -3,7 +3,6 @@
 /// other rays ask for what is missing.
 ///
 ///   [ smooth normals ] -> field_values -> [ cache -> decode -> field_values ]*
-#define ISO_FOUND local
 #include "device/found_slots.h"
 #include "device/pass_counts.h"
 #include "device/touched_requests.h"
@@ -32,7 +31,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void field_va
     global uint *requested_bits, global uint *request_block_ids, uint capacity,
     global CacheState *cache) {
   const FrameParams *frame = &frame_params;
-  local uint slots[8 * ISO_GROUP_SIZE], staged[ISO_REQUEST_STAGING];
+  ISO_SCRATCH_ARRAY(slots, 8);
+  local uint staged[ISO_REQUEST_STAGING];
   local uint num_staged, list_begin, counters[2], num_waiting;
   const Requests requests = {requested_bits, request_block_ids, capacity, &counts->requested_count,
                              staged,         &num_staged};
@@ -64,9 +64,9 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void field_va
       if (is_in_field(place)) {
         base = field_base(place);
         touched = field_blocks(place);
-        missing = touched & ~find_slots(frame, table, base, touched, slots + item);
+        missing = touched & ~find_slots(frame, table, base, touched, slots);
         if (missing == 0) {
-          const CachedStencil cached = {cache_values, slots + item, base, 0};
+          const CachedStencil cached = {cache_values, slots, base, 0};
           float corners[8];
           ISO_UNROLL
           for (int c = 0; c < 8; ++c) {
@@ -75,7 +75,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void field_va
           }
           field_values[pixel] = field_value(corners, place.at);
           /* The stamp of a block stands for the next ones along the axes, too (last_use()). */
-          stamp_read(slot_stamps, slots[item], read_stamp(pass));
+          stamp_read(slot_stamps, slots[0], read_stamp(pass));
         } else {
           atomic_inc(&num_waiting);
         }
@@ -90,7 +90,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void field_va
       const uint place = append_entry(missing != 0, pack_entry(pixel, 0, 0), counters,
                                       &counts->next_active_count, next_active_ray_ids);
       if (missing != 0 && place < window)
-        request_missing(frame, base, touched, missing, place, needed_stamp(pass), slots + item,
+        request_missing(frame, base, touched, missing, place, needed_stamp(pass), slots,
                         slot_stamps, requests, cache);
       list_staged(frame, requests, &list_begin);
       if (item == 0) num_waiting = 0;

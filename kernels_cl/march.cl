@@ -3,7 +3,6 @@
 ///
 /// start_rays -> march -> request_ahead -> [ cache -> decode -> march -> request_ahead ]*. No sort
 /// and no composite: a ray's blocks come in ray order, so its first change is its hit.
-#define ISO_FOUND local
 #include "device/level_borders.h"
 #include "device/march_block.h"
 #include "device/march_pass.h"
@@ -18,8 +17,8 @@ typedef struct RayMarch {
   RayStand stand;
   uint hit_cell;  ///< HitRecord::cell of the ray's last hit, if it stands there
   uint lane, lanes;
-  uint next;           ///< the block that the next round begins with; ISO_INVALID_ID: none is left
-  local uint *blocks;  ///< [num_blocks] of the round, ISO_GROUP_SIZE apart
+  uint next;  ///< the block that the next round begins with; ISO_INVALID_ID: none is left
+  ISO_SCRATCH uint *blocks;  ///< [num_blocks] of the round, ISO_SCRATCH_STRIDE apart
   uint num_blocks;
   uint num_passed;               ///< blocks of this lane in which nothing happened
   int result;                    ///< ISO_RAY_*: what happened in this lane ...
@@ -66,7 +65,7 @@ ISO_INLINE void find_round(const FrameParams *level, global const uint *macrocel
 ISO_INLINE void walk_round(const FrameParams *level, const CacheReader *cache, const Ray *ray,
                            LastPlanes last, int is_first, RayMarch *m) {
   for (uint at = m->lane; at < m->num_blocks && m->result == ISO_RAY_LEFT; at += m->lanes) {
-    const uint block_id = m->blocks[at * ISO_GROUP_SIZE];
+    const uint block_id = m->blocks[at * ISO_SCRATCH_STRIDE];
     const int stands_here = is_first && at == 0;
     const int may_end = m->next == ISO_INVALID_ID && at + 1 == m->num_blocks;
     m->result = march_block(level, cache, ray, last, block_coords(level, block_id),
@@ -142,7 +141,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
     global uint *next_active_ray_ids, global uint *ray_block_ids, global HitRecord *hits,
     global uint *slot_stamps, global CacheState *cache) {
   const FrameParams *frame = &frame_params;
-  local uint slots[8 * ISO_GROUP_SIZE], blocks[ISO_BLOCKS_AT_ONCE * ISO_GROUP_SIZE];
+  ISO_SCRATCH_ARRAY(slots, 8);
+  ISO_SCRATCH_ARRAY(blocks, ISO_BLOCKS_AT_ONCE);
   local uint counters[2], group_hits, group_blocks, num_going;
   volatile local uint decides[ISO_GROUP_SIZE];
   const uint item = get_local_id(0), num_rays = prev->next_active_count;
@@ -153,7 +153,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
       .values = cache_values,
       .slot_stamps = slot_stamps,
       .stamp = read_stamp(counts->pass),
-      .slots = slots + item,
+      .slots = slots,
   };
   uint num_hits = 0, num_blocks = 0;
   if (get_global_id(0) == 0) {
@@ -170,7 +170,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
     ISO_FRAME_OF(level, m.stand.block_id);
     const LastPlanes last = last_planes(level);
     const Ray ray = ray_of(level, clip, given, pixel);
-    m.blocks = blocks + item;
+    m.blocks = blocks;
     m.decides = decides + item / lanes;
     for (int is_first = 1, more = 1; more != 0; is_first = 0) {
       m.num_passed = 0;

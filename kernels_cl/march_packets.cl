@@ -15,7 +15,6 @@
 #ifndef ISO_ON_DEMAND
 #define ISO_ON_DEMAND 0
 #endif
-#define ISO_FOUND local
 #include "device/float8.h"
 #include "device/level_band.h"
 #include "device/march_block.h"
@@ -462,6 +461,30 @@ ISO_INLINE void draw_packet(Packet *p, const PacketScene *scene, global const Cl
 }
 #endif
 
+/// Draws the packets of a tile of the picture; or, unless the rays begin, as many of the list
+/// active_ray_ids [num_rays].
+ISO_LONG void draw_chunk(const PacketScene *scene, global const ClipParams *clip,
+                         int is_active_somewhere, uint begins, global const uint *active_ray_ids,
+                         uint num_rays, uint chunk, LaunchRays *rays) {
+  const FrameParams *frame = scene->frame;
+  const View *view = &frame->view;
+  PacketProgress *progress = scene->field->progress;
+  const PacketPlace tile = tile_place(view, chunk);
+  const uint num_packets = begins != 0 ? ISO_TILE_PACKETS : ISO_LIST_PACKETS;
+  if (begins == ISO_BEGINS_FRAME) clear_hits(view, chunk, rays->hits);
+  for (uint packet = 0; packet < num_packets; ++packet) {
+    const PacketPlace place = packet_place(tile, packet);
+    if (ISO_BANDS && !may_draw(frame, place, begins, rays)) continue;
+    const PacketSource source = begins != 0 ? picture_packet(view, place)
+                                            : listed_packet(view, active_ray_ids, num_rays,
+                                                            ISO_LIST_PACKETS * chunk + packet);
+    Packet p;
+    progress->met = progress->moved = ints(0);
+    p.waits = p.found.lanes = ints(0);
+    draw_packet(&p, scene, clip, is_active_somewhere, source, begins, rays);
+  }
+}
+
 /// Adds what a work-item has done.
 ISO_INLINE void add_counts(const LaunchRays *rays, uint num_blocks, uint num_made, uint begins,
                            global PassCounts *counts) {
@@ -500,7 +523,7 @@ kernel __attribute__((reqd_work_group_size(1, 1, 1))) void march_packets(
     global HitRecord *hits, global uint *slot_block_ids, global uint *slot_stamps,
     global uint *requested_bits, global const uint *free_slots, global CacheState *cache) {
   const FrameParams *frame = &frame_params;
-  local uint slots[8 * ISO_GROUP_SIZE];
+  ISO_SCRATCH_ARRAY(slots, 8);
   OpenedBlock opened[ISO_OPENED_BLOCKS];
   const uint num_rays = prev->next_active_count, stamp = read_stamp(counts->pass),
              num_chunks = count_chunks(&frame->view, begins, num_rays);
@@ -558,22 +581,8 @@ kernel __attribute__((reqd_work_group_size(1, 1, 1))) void march_packets(
   for (uint i = 0; i < ISO_OPENED_BLOCKS; ++i) opened[i].block_id = ISO_INVALID_ID;
   for (uint i = 0; i < ISO_BRICK_VOXELS; ++i) opened[0].voxels[i] = 0; /* read by idle lanes */
   const int is_active_somewhere = make_packet_scene(frame, &field, &scene);
-  for (uint chunk = get_group_id(0); chunk < num_chunks; chunk += get_num_groups(0)) {
-    const PacketPlace tile = tile_place(&frame->view, chunk);
-    if (begins == ISO_BEGINS_FRAME) clear_hits(&frame->view, chunk, hits);
-    for (uint packet = 0; packet < (begins != 0 ? ISO_TILE_PACKETS : ISO_LIST_PACKETS); ++packet) {
-      const PacketPlace place = packet_place(tile, packet);
-      if (ISO_BANDS && !may_draw(frame, place, begins, &rays)) continue;
-      const PacketSource source = begins != 0
-                                      ? picture_packet(&frame->view, place)
-                                      : listed_packet(&frame->view, active_ray_ids, num_rays,
-                                                      ISO_LIST_PACKETS * chunk + packet);
-      Packet p;
-      progress.met = progress.moved = ints(0);
-      p.waits = p.found.lanes = ints(0);
-      draw_packet(&p, &scene, clip, is_active_somewhere, source, begins, &rays);
-    }
-  }
+  for (uint chunk = get_group_id(0); chunk < num_chunks; chunk += get_num_groups(0))
+    draw_chunk(&scene, clip, is_active_somewhere, begins, active_ray_ids, num_rays, chunk, &rays);
   end_streams();
   add_counts(&rays, progress.num_blocks, maker.num_made, begins, counts);
 }

@@ -1,6 +1,5 @@
 /// request_ahead.cl -- pipeline `rays`: each ray that waits asks for the block that it stands at
 /// and its next candidates (Sec. 3.3, 3.4, 4).
-#define ISO_FOUND local
 #include "device/level_borders.h"
 #include "device/ray_lanes.h"
 #include "device/ray_source.h"
@@ -56,7 +55,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_
     global const uint *ray_block_ids, global uint *slot_stamps, global uint *requested_bits,
     global uint *request_block_ids, uint capacity, global CacheState *cache) {
   const FrameParams *frame = &frame_params;
-  local uint found[ISO_BLOCKS_AT_ONCE * ISO_GROUP_SIZE], staged[ISO_REQUEST_STAGING];
+  ISO_SCRATCH_ARRAY(found, ISO_BLOCKS_AT_ONCE);
+  local uint staged[ISO_REQUEST_STAGING];
   local uint num_staged, list_begin, group_pairs, group_ahead;
   const Requests requests = {requested_bits, request_block_ids, capacity, &counts->requested_count,
                              staged,         &num_staged};
@@ -90,12 +90,11 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_
           min(frame->schedule.per_ray_speculation ? max(own, least) : spec_count, most);
       if (lane == 0) num_ahead += ahead;
       for (uint asked = 0; asked < ahead && next != ISO_INVALID_ID;) {
-        const uint num_found =
-            find_blocks_from(level, macrocell_masks, &ray, side, &next,
-                             min(ahead - asked, ISO_BLOCKS_AT_ONCE), found + item);
+        const uint num_found = find_blocks_from(level, macrocell_masks, &ray, side, &next,
+                                                min(ahead - asked, ISO_BLOCKS_AT_ONCE), found);
         side = ISO_SIDE_UNKNOWN;
         for (uint at = lane; at < num_found; at += lanes) { /* all lanes at once */
-          const uint block_id = found[at * ISO_GROUP_SIZE + item];
+          const uint block_id = found[at * ISO_SCRATCH_STRIDE];
           const BlockCoords b = block_coords(level, block_id);
           const int is_first = i == 0 && asked + at == 0;
           ++num_pairs;

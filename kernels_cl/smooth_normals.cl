@@ -4,7 +4,6 @@
 ///   [ a pipeline's passes ] -> smooth_normals -> [ cache -> decode -> smooth_normals ]*
 ///
 /// All but the gradients of hits keep their bits.
-#define ISO_FOUND local
 #include "device/found_slots.h"
 #include "device/level_borders.h"
 #include "device/pass_counts.h"
@@ -48,16 +47,16 @@ ISO_INLINE Gradient cached_gradient(const CachedStencil *cached, const Stencil *
 ISO_INLINE void stamp_stencil(global uint *slot_stamps, uint stamp, BlockCoords b,
                               const CachedStencil *cached) {
   const uint own = (b.x - cached->base.x) + 2 * (b.y - cached->base.y) + 4 * (b.z - cached->base.z);
-  stamp_read(slot_stamps, cached->slots[own * ISO_GROUP_SIZE], stamp);
+  stamp_read(slot_stamps, cached->slots[own * ISO_SCRATCH_STRIDE], stamp);
   for (uint step = 1; step < 8; step *= 2) {
     if ((own & step) != 0)
-      stamp_read(slot_stamps, cached->slots[(own - step) * ISO_GROUP_SIZE], stamp);
+      stamp_read(slot_stamps, cached->slots[(own - step) * ISO_SCRATCH_STRIDE], stamp);
   }
 }
 
 /// Gives a hit its gradient, made of cached blocks.
-ISO_INLINE void write_gradient(global HitRecord *hit, const CachedStencil *cached,
-                               const Stencil *stencil) {
+ISO_LONG void write_gradient(global HitRecord *hit, const CachedStencil *cached,
+                             const Stencil *stencil) {
   const CellPoint at = {hit->x, hit->y, hit->z};
   const Gradient gradient = cached_gradient(cached, stencil, at);
   if (is_no_gradient(gradient)) return;
@@ -85,7 +84,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void smooth_n
     global uint *slot_stamps, global uint *requested_bits, global uint *request_block_ids,
     uint capacity, global CacheState *cache) {
   const FrameParams *frame = &frame_params;
-  local uint slots[8 * ISO_GROUP_SIZE], staged[ISO_REQUEST_STAGING];
+  ISO_SCRATCH_ARRAY(slots, 8);
+  local uint staged[ISO_REQUEST_STAGING];
   local uint num_staged, list_begin, counters[2], num_waiting;
   const Requests requests = {requested_bits, request_block_ids, capacity, &counts->requested_count,
                              staged,         &num_staged};
@@ -121,9 +121,9 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void smooth_n
       const Stencil stencil = stencil_of(b, hits[pixel].cell, last_planes(level));
       base = stencil_base(&stencil);
       touched = stencil_blocks(&stencil);
-      missing = touched & ~find_slots(level, table, base, touched, slots + item);
+      missing = touched & ~find_slots(level, table, base, touched, slots);
       if (missing == 0) {
-        const CachedStencil cached = {cache_values, slots + item, base,
+        const CachedStencil cached = {cache_values, slots, base,
                                       hits[pixel].cell >> ISO_SURFACE_BIT};
         write_gradient(&hits[pixel], &cached, &stencil);
         stamp_stencil(slot_stamps, read_stamp(pass), b, &cached);
@@ -139,7 +139,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void smooth_n
                                       &counts->next_active_count, next_active_ray_ids);
       if (missing != 0 && place < window) {
         ISO_FRAME_OF(level, block_id);
-        request_missing(level, base, touched, missing, place, needed_stamp(pass), slots + item,
+        request_missing(level, base, touched, missing, place, needed_stamp(pass), slots,
                         slot_stamps, requests, cache);
       }
       list_staged(frame, requests, &list_begin);

@@ -1,7 +1,6 @@
 /// start_rays.cl -- pipeline `rays`: begins a frame, or a list of rays, with those that meet an
 /// active block (Sec. 3.2, 3.3). A kernel of its own, since it is so much leaner than march that
 /// far more of its work-items fit a device at a time.
-#define ISO_FOUND local
 #include "device/level_borders.h"
 #include "device/ray_source.h"
 #include "device/work_group.h"
@@ -55,7 +54,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_ra
     global uint *next_active_ray_ids, global uint *ray_block_ids,
     global ISO_WORDS(HitRecord) *hit_words) {
   const FrameParams *frame = &frame_params;
-  local uint found[ISO_GROUP_SIZE], counters[2];
+  ISO_SCRATCH_ARRAY(found, 1);
+  local uint counters[2];
   const PixelBox box = {frame->screen.begin_x, frame->screen.begin_y, frame->screen.end_x,
                         frame->screen.end_y};
   const uint item = get_local_id(0), num_tiled = num_tiled_pixels(box);
@@ -85,10 +85,10 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_ra
       const Ray ray = ray_of(level, clip, given, pixel);
       if (!ISO_CLIP || has_interval(&ray))
         stand = begin_in_level(level, &ray, macrocell_masks, ranges, no_data, no_data_begin,
-                               side_where_cut(clip, &ray), found + item);
+                               side_where_cut(clip, &ray), found);
       if (stand == ISO_INVALID_ID) {
         stand = cross_borders(frames, num_frames, clip, macrocell_masks, ranges, no_data,
-                              no_data_begin, pixel, 0, ISO_SIDE_UNKNOWN, found + item);
+                              no_data_begin, pixel, 0, ISO_SIDE_UNKNOWN, found);
         log_ahead = ISO_BORDER_LOG_AHEAD;
       }
       if (stand != ISO_INVALID_ID) ray_block_ids[pixel] = stand;

@@ -75,13 +75,13 @@ TEST_P(InProcessOnDevice, PagesAreThereWhenTheyAreWrittenTo) {
 }
 
 TEST_P(InProcessOnDevice, CompilersCodeIsGivenBackAndStillWorks) {
-  device_.program("scan", {{"ISO_GROUP_SIZE", "64"}});
+  device_.build("scan", {{"ISO_GROUP_SIZE", "64"}});
   const std::uint64_t before = resident().compiler;
   if (before == 0) GTEST_SKIP() << "this PoCL has LLVM within itself";
   EXPECT_GT(before, 4 * kMiB);
   ocl::give_back_compiler(device_.info());
   EXPECT_LT(resident().compiler, 2 * kMiB);
-  device_.program("scan", {{"ISO_GROUP_SIZE", "64"}, {"ISO_NOT_USED", "1"}});
+  device_.build("scan", {{"ISO_GROUP_SIZE", "64"}, {"ISO_NOT_USED", "1"}});
   EXPECT_GT(resident().compiler, 2 * kMiB);
 }
 

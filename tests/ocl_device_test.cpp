@@ -195,11 +195,32 @@ TEST_P(OclDeviceOnDevice, TooLittleLocalMemoryIsRefused) {
 
 TEST_P(OclDeviceOnDevice, ProgramsAreBuiltOncePerDefines) {
   ocl::Device device(GetParam());
-  const cl::Program &first = device.program("launch_probe");
-  const cl::Program &other = device.program("launch_probe", {{"ISO_SOME_DEFINE", "1"}});
-  EXPECT_EQ(&device.program("launch_probe"), &first);
-  EXPECT_EQ(&device.program("launch_probe", {{"ISO_SOME_DEFINE", "1"}}), &other);
+  const cl::Program &first = device.program("scan", {{"ISO_GROUP_SIZE", "32u"}});
+  const cl::Program &other = device.program("scan", {{"ISO_GROUP_SIZE", "64u"}});
+  EXPECT_EQ(&device.program("scan", {{"ISO_GROUP_SIZE", "32u"}}), &first);
+  EXPECT_EQ(&device.program("scan", {{"ISO_GROUP_SIZE", "64u"}}), &other);
   EXPECT_NE(&first, &other);
+  EXPECT_EQ(&device.program("scan", {{"ISO_GROUP_SIZE", "32u"}, {"ISO_NOT_IN_ITS_TEXT", "1"}}),
+            &first);
+}
+
+TEST_P(OclDeviceOnDevice, ProgramsAreSharedByAllWhoOpenADevice) {
+  ocl::Device first(GetParam());
+  const cl::Program &program = first.program("scan", {{"ISO_GROUP_SIZE", "32u"}});
+  ocl::Device second(GetParam());
+  EXPECT_THAT(second.built_programs(), testing::IsEmpty()) << "a list for each";
+  EXPECT_EQ(&second.program("scan", {{"ISO_GROUP_SIZE", "32u"}}), &program);
+  EXPECT_EQ(second.built_programs().size(), 1u);
+}
+
+TEST_P(OclDeviceOnDevice, AbandonedContextsAreNotGivenToOthers) {
+  ocl::Device first(GetParam());
+  const cl_context context = first.context()();
+  ocl::DeviceContext::of(cl::Device(first.context().getInfo<CL_CONTEXT_DEVICES>().front()))
+      ->abandon();
+  ocl::Device second(GetParam());
+  EXPECT_NE(second.context()(), context);
+  EXPECT_EQ(ocl::Device(GetParam()).context()(), second.context()());
 }
 
 TEST_P(OclDeviceOnDevice, BuildErrorsNameFileAndLine) {

@@ -26,8 +26,9 @@ inline void PrintTo(const DeviceInfo &info, std::ostream *out) {
 
 /// The device that ISOWAVE_DEVICE chooses when it is set, else every device. Empty when there is
 /// none: GoogleTest then fails the suite, since a suite that is instantiated with nothing is an
-/// error.
+/// error. Each device keeps its programs from case to case.
 inline std::vector<ocl::DeviceInfo> devices_under_test() {
+  ocl::DeviceContext::keep_all();
   const char *chosen = std::getenv("ISOWAVE_DEVICE");
   if (chosen && *chosen) return {ocl::choose_device()};
   return ocl::list_devices();

@@ -8,6 +8,7 @@
 
 #include "core/base/error.hpp"
 #include "core/base/ms_since.hpp"
+#include "core/base/parallel_for.hpp"
 #include "core/ocl/arithmetic.hpp"
 #include "core/ocl/build_log.hpp"
 #include "core/ocl/device_list.hpp"
@@ -61,6 +62,28 @@ std::string build_options(const DeviceInfo &device, Defines defines) {
   return options;
 }
 
+cl::Program build_program(const cl::Context &context, const cl::Device &device,
+                          const DeviceInfo &info, const ProgramKey &key) {
+  const auto &[stem, defines] = key;
+  const std::string options = build_options(info, defines);
+  try {
+    cl::Program program(context, kernel_text(stem));
+    program.build(device, options.c_str());
+    return program;
+  } catch (const cl::BuildError &error) {
+    std::string log;
+    for (const auto &[at, said] : error.getBuildLog())
+      log += with_file_names(said, kernel_text(stem));
+    const std::string message =
+        fmt::format("{}.cl does not build on '{}' with {}: {}: {}{}", stem, info.name, options,
+                    error_name(error.err()), first_error(log), cache_trouble());
+    throw BuildError(message, std::move(log));
+  } catch (const cl::Error &error) {
+    throw Error("{}.cl does not build on '{}' with {}: {}: {}", stem, info.name, options,
+                error.what(), error_name(error.err()));
+  }
+}
+
 /// Abilities that kernels need and OpenCL's embedded profile leaves out, or nothing.
 std::string lacking(const cl::Device &device, const Capabilities &can) {
   if (device.getInfo<CL_DEVICE_PROFILE>().starts_with("EMBEDDED_PROFILE") &&
@@ -86,14 +109,15 @@ Device::Device(const DeviceInfo &info, bool profiling) : info_(info), device_(de
           "device '{}' has {} KiB of local memory, {} are needed: choose another with --device",
           info_.name, can.local_memory >> 10, kNeededLocalMemory >> 10);
     }
-    context_ = cl::Context(device_);
+    context_ = DeviceContext::of(device_);
+    const cl::Context &context = context_->context;
     TimerSource source = TimerSource::kOff;
     if (profiling) {
-      queue_ = cl::CommandQueue(context_, device_, CL_QUEUE_PROFILING_ENABLE);
+      queue_ = cl::CommandQueue(context, device_, CL_QUEUE_PROFILING_ENABLE);
       source =
-          reports_event_times(context_, queue_) ? TimerSource::kEvents : TimerSource::kWallClock;
+          reports_event_times(context, queue_) ? TimerSource::kEvents : TimerSource::kWallClock;
     }
-    if (source != TimerSource::kEvents) queue_ = cl::CommandQueue(context_, device_);
+    if (source != TimerSource::kEvents) queue_ = cl::CommandQueue(context, device_);
     timer_.start(source, queue_);
   } catch (const cl::Error &error) {
     throw Error("cannot open device '{}' ({}): {}: {}", info_.name, info_.platform, error.what(),
@@ -111,7 +135,7 @@ cl::CommandQueue &Device::transfer_queue() {
   try {
     const cl_command_queue_properties properties =
         timer_.source() == TimerSource::kEvents ? CL_QUEUE_PROFILING_ENABLE : 0;
-    transfer_queue_ = cl::CommandQueue(context_, device_, properties);
+    transfer_queue_ = cl::CommandQueue(context(), device_, properties);
   } catch (const cl::Error &error) {
     throw Error("device '{}' gives no second queue: {}: {}", info_.name, error.what(),
                 error_name(error.err()));
@@ -126,34 +150,46 @@ void Device::draw_no_data() {
   draws_no_data_ = true;
 }
 
-const cl::Program &Device::program(std::string_view stem, const Defines &defines) {
-  auto key = std::make_pair(std::string(stem), defines);
+ProgramKey Device::key_of(std::string_view stem, const Defines &defines) const {
+  ProgramKey key(stem, defines);
   if (draws_bricks_) key.second.emplace("ISO_BRICKS", "1");
   if (draws_no_data_) key.second.emplace("ISO_NO_DATA", "1");
-  if (const auto found = programs_.find(key); found != programs_.end()) return found->second;
-  cl::Program program = build(stem, key.second);
-  return programs_.emplace(std::move(key), std::move(program)).first->second;
+  // Programs that do not differ are the same one.
+  const std::string text = kernel_text(stem);
+  std::erase_if(key.second, [&](const auto &macro) { return text.find(macro.first) == text.npos; });
+  return key;
+}
+
+const cl::Program &Device::program(std::string_view stem, const Defines &defines) {
+  ProgramKey key = key_of(stem, defines);
+  if (const auto found = programs_.find(key); found != programs_.end()) return *found->second;
+  const Compiling now = compiling();
+  const cl::Program &program =
+      context_->program(key, [&] { return build_program(context(), device_, info_, key); });
+  programs_.emplace(std::move(key), &program);
+  return program;
+}
+
+void Device::expect(std::string_view stem, const Defines &defines) {
+  if (info_.type == DeviceType::kGpu) expected_.insert(key_of(stem, defines));
+}
+
+void Device::build_expected() {
+  const Compiling now = compiling();
+  const std::vector<ProgramKey> keys(expected_.begin(), expected_.end());
+  expected_.clear();
+  parallel_for(keys.size(), 0, [&](std::uint64_t i, std::uint32_t) {
+    try {
+      context_->program(keys[i], [&] { return build_program(context(), device_, info_, keys[i]); });
+    } catch (const Error &) {
+      return;  // to be thrown again by program()
+    }
+  });
 }
 
 cl::Program Device::build(std::string_view stem, const Defines &defines) {
-  const std::string options = build_options(info_, defines);
   const Compiling now = compiling();
-  try {
-    cl::Program program(context_, kernel_text(stem));
-    program.build(device_, options.c_str());
-    return program;
-  } catch (const cl::BuildError &error) {
-    std::string log;
-    for (const auto &[device, said] : error.getBuildLog())
-      log += with_file_names(said, kernel_text(stem));
-    const std::string message =
-        fmt::format("{}.cl does not build on '{}' with {}: {}: {}{}", stem, info_.name, options,
-                    error_name(error.err()), first_error(log), cache_trouble());
-    throw BuildError(message, std::move(log));
-  } catch (const cl::Error &error) {
-    throw Error("{}.cl does not build on '{}' with {}: {}: {}", stem, info_.name, options,
-                error.what(), error_name(error.err()));
-  }
+  return build_program(context(), device_, info_, {std::string(stem), defines});
 }
 
 std::vector<std::string> Device::built_programs() const {
@@ -196,6 +232,7 @@ void Device::finish() {
       queue->finish();
     }
   } catch (const cl::Error &error) {
+    context_->abandon();
     throw Error("device '{}' failed: {}: {}", info_.name, error.what(), error_name(error.err()));
   }
 }

@@ -10,12 +10,15 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <memory>
+#include <set>
 #include <span>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "core/ocl/device_context.hpp"
 #include "core/ocl/memory_ledger.hpp"
 #include "core/ocl/stage_timer.hpp"
 
@@ -82,9 +85,6 @@ DrawsOn choose_drawing(std::string_view selector = "");
 DrawsOn pick_drawing(const std::function<std::vector<DeviceInfo>()> &list,
                      std::string_view selector, std::string_view environment);
 
-/// Macro name -> value, passed as -D to a program build. No white space in either.
-using Defines = std::map<std::string, std::string>;
-
 class Device {
  public:
   /// profiling  record events so that StageTimer reports; costs about 10 us a launch on GPUs
@@ -99,7 +99,7 @@ class Device {
   /// One line on what the device computes otherwise than the host, so that pictures may differ in
   /// last bits; empty: nothing. From a self-test at opening (core/ocl/arithmetic.hpp).
   const std::string &notice() const { return notice_; }
-  const cl::Context &context() const { return context_; }
+  const cl::Context &context() const { return context_->context; }
   cl::CommandQueue &queue() { return queue_; }
   /// A second in-order queue, made when it is first asked for: for transfers that overlap with the
   /// work of queue(). Events order the two.
@@ -110,10 +110,16 @@ class Device {
   StageTimer &timer() { return timer_; }
 
   /// The program of one kernel file stem ("radix_sort" -> kernels_cl/paper/radix_sort.cl), built
-  /// once per (stem, defines).
+  /// once per (stem, defines) by all that have the device open.
   ///
   /// Throws  BuildError: it does not build
   const cl::Program &program(std::string_view stem, const Defines &defines = {});
+
+  /// Kernels of this program are likely to be launched.
+  void expect(std::string_view stem, const Defines &defines);
+  /// Builds the expected programs together, if the driver builds on several processors at a time. A
+  /// program that does not build fails when it is asked for.
+  void build_expected();
 
   /// A program of its own, which the device does not keep.
   ///
@@ -129,7 +135,7 @@ class Device {
   /// Throws  Error: the device has no NaN
   void draw_no_data();
 
-  /// The programs built so far, sorted: "march -D ISO_GROUP_SIZE=64 -D ISO_LEVELS=0".
+  /// The programs asked for so far, sorted: "march -D ISO_GROUP_SIZE=64 -D ISO_LEVELS=0".
   std::vector<std::string> built_programs() const;
 
   /// While one lives, all that happens counts as compiling. For launches that do nothing but make
@@ -171,13 +177,17 @@ class Device {
   bool settle() noexcept;
 
  private:
+  /// With all macros that the program's text knows.
+  ProgramKey key_of(std::string_view stem, const Defines &defines) const;
+
   DeviceInfo info_;
   cl::Device device_;
-  cl::Context context_;
+  std::shared_ptr<DeviceContext> context_;
   cl::CommandQueue queue_, transfer_queue_;
   MemoryLedger ledger_;
   StageTimer timer_;
-  std::map<std::pair<std::string, Defines>, cl::Program> programs_;
+  std::map<ProgramKey, const cl::Program *> programs_;
+  std::set<ProgramKey> expected_;
   std::function<void(std::string_view)> on_new_kernel_;
   std::string notice_;
   double compile_ms_ = 0;

@@ -199,11 +199,12 @@ DeviceRenderer::DeviceRenderer(ocl::Device &device, const CompressedVolume &volu
 /// behind, which every frame clears.
 void DeviceRenderer::compile_kernels() {
   const auto compiling = device_.compiling();
+  device_.build_expected();
   Wavefront &rays = rays_;
-  rays.frame = FrameParams{};
+  rays.frame = {};
   rays.frame.view.width = rays.frame.view.height = rays.frame.schedule.max_spec_count = 1;
   rays.frame.schedule.table_groups = blocks_.cache.table_groups;
-  // Frames of one level of detail and of several have kernels of their own.
+  // Frames of one level of detail and of several have their own kernels.
   for (std::uint32_t num_levels = 1; num_levels <= std::min<std::size_t>(2, blocks_.levels.size());
        ++num_levels) {
     rays.num_level_frames = num_levels;

@@ -57,7 +57,7 @@ ocl::BufferSizes BlockCache::sizes(const Limits &limits) {
 BlockCache::BlockCache(ocl::Device &device, const Limits &limits, std::uint32_t group_size,
                        bool levels)
     : BlockCache(device, limits, sizes(limits), group_size,
-                 with_slots(with_levels(group_defines(group_size), levels), limits.slot_type)) {}
+                 with_levels(group_defines(group_size), levels)) {}
 
 BlockCache::BlockCache(ocl::Device &device, const Limits &limits, const ocl::BufferSizes &sizes,
                        std::uint32_t group_size, const ocl::Defines &defines)
@@ -123,7 +123,8 @@ void BlockCache::resize(const Limits &limits) {
 }
 
 void BlockCache::classify(Wavefront &rays) {
-  classify_(slots_range_, rays.frame, num_slots, slot_block_ids, values, inside, table);
+  classify_(slots_range_, rays.frame, num_slots, static_cast<uint>(slot_type), slot_block_ids,
+            values, inside, table);
 }
 
 void BlockCache::count_touched(Wavefront &rays, bool in_dual_grids) {

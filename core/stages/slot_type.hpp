@@ -7,11 +7,19 @@
 
 #include "core/ocl/kernel.hpp"
 #include "core/zfp/zfp_stream.hpp"
+#include "kernels_cl/portable/shared_types.h"
 
 namespace isowave::core {
 
 /// kGroups: bit masks of the groups of labels (kernels_cl/portable/label_table.h).
-enum class SlotType { kFloat32, kUint8, kInt8, kUint16, kInt16, kGroups };
+enum class SlotType : std::uint32_t {
+  kFloat32 = ISO_SLOTS_FLOAT32,
+  kUint8 = ISO_SLOTS_UINT8,
+  kInt8 = ISO_SLOTS_INT8,
+  kUint16 = ISO_SLOTS_UINT16,
+  kInt16 = ISO_SLOTS_INT16,
+  kGroups = ISO_SLOTS_GROUPS
+};
 
 /// A byte of a slot. Kernels read and write values of a SlotType (kernels_cl/device/slot_values.h).
 struct SlotValue {

@@ -34,10 +34,10 @@
 
 /// Decodes block block_id, which is number `place` in a window. values [64]: x + 4 y + 16 z; NaN of
 /// voxels without data; with ISO_LABELS, bit masks of the groups of voxels.
-ISO_INLINE void decode_block(global const uint *part_0, global const uint *part_1,
-                             global const uint *part_2, global const uint *part_3,
-                             global const uint *index, StreamLayout layout, uint block_id,
-                             uint place, float *values) {
+ISO_LONG void decode_block(global const uint *part_0, global const uint *part_1,
+                           global const uint *part_2, global const uint *part_3,
+                           global const uint *index, StreamLayout layout, uint block_id, uint place,
+                           float *values) {
   global const uint *words = part_0;
   uint bits = layout.bits_per_block;
   ulong first_bit = (ulong)block_id * bits;

@@ -2,13 +2,18 @@
 /// OpenCL C 1.2. Two-level grid: a coarse macrocell is 4^3 blocks; its 64 bits say which of them
 /// are active (macrocells.cl). A coarse cell with no bit is left in one step.
 ///
-/// Define ISO_FOUND, the address space of the list, before including this.
+/// ISO_FOUND is the address space of the list. Define it before including this, unless it is that
+/// of scratch.
 #ifndef ISOWAVE_BLOCK_WALK_H
 #define ISOWAVE_BLOCK_WALK_H
 
 #include "level_band.h"
 #include "portable/block_grid.h"
 #include "portable/grid_dda.h"
+
+#ifndef ISO_FOUND
+#define ISO_FOUND ISO_SCRATCH
+#endif
 
 /// Blocks that a ray finds before it intersects them, or asks for them. On a GPU, a longer list is
 /// walked by more work-items: a last ray has up to one for each block. A CPU would look for more
@@ -42,9 +47,9 @@ ISO_INLINE GridWalk enter_macrocell(const Ray *ray, const GridWalk *coarse, RayE
 /// Walks on from block *block_id, within the box of active blocks, to the next `wanted` active
 /// blocks, into found [wanted], `stride` apart. Returns how many there are before the ray has left
 /// the box, or its interval; *block_id becomes the first block not looked at, or ISO_INVALID_ID.
-ISO_INLINE uint find_blocks(const FrameParams *frame, global const uint *macrocell_masks,
-                            const Ray *ray, uint *block_id, uint wanted, ISO_FOUND uint *found,
-                            uint stride) {
+ISO_LONG uint find_blocks(const FrameParams *frame, global const uint *macrocell_masks,
+                          const Ray *ray, uint *block_id, uint wanted, ISO_FOUND uint *found,
+                          uint stride) {
   const LastPlanes last = last_planes(frame);
   const uint coarse_x = (frame->grid.blocks_x + 3) / 4, coarse_y = (frame->grid.blocks_y + 3) / 4;
   const uint begin = masks_begin(frame);

@@ -7,10 +7,10 @@
 #include "work_group.h"
 
 /// Looks for those of the 2^3 blocks from `base` on whose bits (corner x + 2y + 4z) are set in
-/// `wanted`. Returns which of them are cached, and their places in slots [8], ISO_GROUP_SIZE apart.
-/// All are read before one is looked at: a GPU waits once.
-ISO_INLINE uint find_slots(const FrameParams *frame, global const BlockEntry *table,
-                           BlockCoords base, uint wanted, local uint *slots) {
+/// `wanted`. Returns which of them are cached, and their places in slots [8], ISO_SCRATCH_STRIDE
+/// apart. All are read before one is looked at: a GPU waits once.
+ISO_LONG uint find_slots(const FrameParams *frame, global const BlockEntry *table, BlockCoords base,
+                         uint wanted, ISO_SCRATCH uint *slots) {
   uint keys[8], found[8], have = 0;
   ISO_UNROLL
   for (uint corner = 0; corner < 8; ++corner) {
@@ -30,17 +30,17 @@ ISO_INLINE uint find_slots(const FrameParams *frame, global const BlockEntry *ta
     uint slot = found[corner];
     if (keys[corner] != ISO_INVALID_ID && keys[corner] != block_id_at(frame, x, y, z))
       slot = cached_slot(frame, table, x, y, z);
-    slots[corner * ISO_GROUP_SIZE] = slot;
+    slots[corner * ISO_SCRATCH_STRIDE] = slot;
     have |= (uint)(slot != ISO_BLOCK_ABSENT) << corner;
   }
   return have;
 }
 
-/// The voxels of a stencil in the cache: in slots [8] of the blocks from `base` on, ISO_GROUP_SIZE
-/// apart.
+/// The voxels of a stencil in the cache: in slots [8] of the blocks from `base` on,
+/// ISO_SCRATCH_STRIDE apart.
 typedef struct CachedStencil {
   global const SlotValue *values;
-  local const uint *slots;
+  ISO_SCRATCH const uint *slots;
   BlockCoords base;
   uint group;  ///< whose field the voxels are of; only read if ISO_LABELS is 1
 } CachedStencil;
@@ -48,7 +48,7 @@ typedef struct CachedStencil {
 ISO_INLINE float stencil_voxel(const CachedStencil *cached, int x, int y, int z) {
   const uint vx = (uint)x - 4 * cached->base.x, vy = (uint)y - 4 * cached->base.y,
              vz = (uint)z - 4 * cached->base.z;
-  const uint slot = cached->slots[((vx >> 2) + 2 * (vy >> 2) + 4 * (vz >> 2)) * ISO_GROUP_SIZE];
+  const uint slot = cached->slots[((vx >> 2) + 2 * (vy >> 2) + 4 * (vz >> 2)) * ISO_SCRATCH_STRIDE];
   const float value =
       cached->values[slot * ISO_BLOCK_VOXELS + (vx & 3) + 4 * (vy & 3) + 16 * (vz & 3)];
   return ISO_LABELS ? group_field((uint)value, cached->group) : value;

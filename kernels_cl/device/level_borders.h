@@ -1,7 +1,5 @@
 /// level_borders.h -- a ray from one level of detail to the next (core/view/detail.hpp). OpenCL
 /// C 1.2.
-///
-/// Define ISO_FOUND local before including this.
 #ifndef ISOWAVE_LEVEL_BORDERS_H
 #define ISOWAVE_LEVEL_BORDERS_H
 
@@ -32,7 +30,7 @@ ISO_INLINE uint side_of_block(const FrameParams *frame, global const uint *macro
 
 /// Does the ray reach the border at t within the brick's own blocks? If so, *b is the one that it
 /// is in just behind it.
-ISO_INLINE int block_at_border(const FrameParams *frame, const Ray *ray, float t, BlockCoords *b) {
+ISO_LONG int block_at_border(const FrameParams *frame, const Ray *ray, float t, BlockCoords *b) {
   const LastPlanes last = last_planes(frame);
   if (!reaches_border(ray, last, t)) return 0;
   *b = region_at_border(ray, last, t, 4);
@@ -66,10 +64,10 @@ ISO_INLINE int lacks_data_at_border(const FrameParams *frame, global const uint 
 /// ranges   ranges of all levels' blocks
 /// no_data  as lacks_data_at_border
 /// found    [1] scratch
-ISO_INLINE uint begin_in_level(const FrameParams *frame, const Ray *ray,
-                               global const uint *macrocell_masks, global const ushort *ranges,
-                               global const uint *no_data, uint no_data_begin, uint side,
-                               local uint *found) {
+ISO_LONG uint begin_in_level(const FrameParams *frame, const Ray *ray,
+                             global const uint *macrocell_masks, global const ushort *ranges,
+                             global const uint *no_data, uint no_data_begin, uint side,
+                             ISO_SCRATCH uint *found) {
   BlockCoords b;
   if (has_side(side) && block_at_border(frame, ray, ray->begin_t, &b) &&
       side_of_block(frame, macrocell_masks, ranges, b) != side &&
@@ -101,11 +99,11 @@ ISO_INLINE uint side_at_end(const FrameParams *frame, global const uint *macroce
 /// clip  as ray_of()
 /// side  side on which the ray left; unknown: the border is in a block that is as a whole on one
 ///       side, or in a cell without data
-ISO_INLINE uint cross_borders(global const FrameParams *frames, uint num_frames,
-                              global const ClipParams *clip, global const uint *macrocell_masks,
-                              global const ushort *ranges, global const uint *no_data,
-                              uint no_data_begin, uint pixel, uint level, uint side,
-                              local uint *found) {
+ISO_LONG uint cross_borders(global const FrameParams *frames, uint num_frames,
+                            global const ClipParams *clip, global const uint *macrocell_masks,
+                            global const ushort *ranges, global const uint *no_data,
+                            uint no_data_begin, uint pixel, uint level, uint side,
+                            ISO_SCRATCH uint *found) {
   uint stand = ISO_INVALID_ID;
   for (; ISO_BANDS && level + 1 < num_frames && stand == ISO_INVALID_ID; ++level) {
     const FrameParams behind = frames[level + 1];
@@ -137,9 +135,9 @@ ISO_INLINE uint cross_borders(global const FrameParams *frames, uint num_frames,
 
 /// find_blocks() for a ray that stands at block *block_id. A ray with a side, or at a hit, which
 /// may be a cap, looks into this block even if the block is not active.
-ISO_INLINE uint find_blocks_from(const FrameParams *frame, global const uint *macrocell_masks,
-                                 const Ray *ray, uint side, uint *block_id, uint wanted,
-                                 local uint *found) {
+ISO_LONG uint find_blocks_from(const FrameParams *frame, global const uint *macrocell_masks,
+                               const Ray *ray, uint side, uint *block_id, uint wanted,
+                               ISO_SCRATCH uint *found) {
   uint first = 0;
   if (has_side(side) || is_at_hit(side)) {
     found[0] = *block_id;
@@ -148,7 +146,7 @@ ISO_INLINE uint find_blocks_from(const FrameParams *frame, global const uint *ma
     if (wanted == 1 || *block_id == ISO_INVALID_ID) return 1;
   }
   return first + find_blocks(frame, macrocell_masks, ray, block_id, wanted - first,
-                             found + first * ISO_GROUP_SIZE, ISO_GROUP_SIZE);
+                             found + first * ISO_SCRATCH_STRIDE, ISO_SCRATCH_STRIDE);
 }
 
 #endif

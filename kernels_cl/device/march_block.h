@@ -17,8 +17,8 @@ typedef struct CacheReader {
   global const ulong *inside;
   global const SlotValue *values;
   global uint *slot_stamps;
-  uint stamp;         ///< read_stamp() of the pass: the stamp of every cached block that is opened
-  local uint *slots;  ///< scratch for the slots of a dual grid: 8, ISO_GROUP_SIZE apart
+  uint stamp;  ///< read_stamp() of the pass: the stamp of every cached block that is opened
+  ISO_SCRATCH uint *slots;  ///< for the slots of a dual grid: 8, ISO_SCRATCH_STRIDE apart
 } CacheReader;
 
 /// The end of a ray's way through a block.
@@ -91,7 +91,7 @@ ISO_INLINE ulong open_block(const FrameParams *frame, const CacheReader *cache, 
           (b.z + 1 == frame->grid.blocks_z ? 0xF0u : 0u);
   ISO_UNROLL
   for (uint corner = 0; corner < 8; ++corner) {
-    cache->slots[corner * ISO_GROUP_SIZE] = entries[corner].slot;
+    cache->slots[corner * ISO_SCRATCH_STRIDE] = entries[corner].slot;
     *have |= (uint)(entries[corner].slot != ISO_BLOCK_ABSENT) << corner;
   }
   cells = (ulong)entries[0].changing_high << 32 | entries[0].changing_low;
@@ -158,9 +158,9 @@ ISO_INLINE CellWalk start_at_hit(const Ray *ray, BlockCoords b, uint cell, LastP
 /// may_end  the ray may end in this block
 /// Returns  ISO_RAY_LEFT (the block), ISO_RAY_HIT, ISO_RAY_DOUBT, ISO_RAY_WAITS if a block of the
 ///          dual grid is not cached, or how the ray ends
-ISO_INLINE int march_block(const FrameParams *frame, const CacheReader *cache, const Ray *ray,
-                           LastPlanes last, BlockCoords b, int precise, uint side, uint hit_cell,
-                           int may_end, BlockChange *found) {
+ISO_LONG int march_block(const FrameParams *frame, const CacheReader *cache, const Ray *ray,
+                         LastPlanes last, BlockCoords b, int precise, uint side, uint hit_cell,
+                         int may_end, BlockChange *found) {
   uint have; /* corners of the dual grid */
   int result = ISO_RAY_LEFT;
   const ulong cells = open_block(frame, cache, b, &have);
@@ -189,7 +189,7 @@ ISO_INLINE int march_block(const FrameParams *frame, const CacheReader *cache, c
         for (int corner = 0; corner < 8; ++corner) {
           const int vx = x + (corner & 1), vy = y + (corner >> 1 & 1), vz = z + (corner >> 2);
           const uint slot =
-              cache->slots[((vx >> 2) + 2 * (vy >> 2) + 4 * (vz >> 2)) * ISO_GROUP_SIZE];
+              cache->slots[((vx >> 2) + 2 * (vy >> 2) + 4 * (vz >> 2)) * ISO_SCRATCH_STRIDE];
           found->w[corner] =
               field_of_slot(frame, cache->values[slot * ISO_BLOCK_VOXELS +
                                                  (uint)((vx & 3) + 4 * (vy & 3) + 16 * (vz & 3))]) -
@@ -228,8 +228,8 @@ ISO_INLINE uint leaves_on(int result) {
                                          : ISO_SIDE_UNKNOWN;
 }
 
-ISO_INLINE HitRecord hit_of(const FrameParams *frame, global const ClipParams *clip, const Ray *ray,
-                            const BlockChange *found) {
+ISO_LONG HitRecord hit_of(const FrameParams *frame, global const ClipParams *clip, const Ray *ray,
+                          const BlockChange *found) {
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
   const float s =
       changes_at_border(found) ? 0.0f : refine(solver, found->change.cubic, found->change.bracket);

@@ -66,7 +66,7 @@ ISO_SELDOM void open_with_voxels(const CacheReader *cache, const FrameParams *fr
   opened->have |= ISO_OPENED_CACHED;
   stamp_block(cache);
   _Pragma("unroll") for (uint corner = 0; corner < 8; ++corner) {
-    const uint slot = cache->slots[corner * ISO_GROUP_SIZE];
+    const uint slot = cache->slots[corner * ISO_SCRATCH_STRIDE];
     if (slot != ISO_BLOCK_ABSENT)
       copy_corner(frame, cache->values + slot * ISO_BLOCK_VOXELS, corner, opened->voxels);
   }

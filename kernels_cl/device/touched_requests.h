@@ -52,14 +52,14 @@ ISO_INLINE void request_corners(const FrameParams *frame, BlockCoords b, uint co
 /// Asks for the missing ones of the touched corners; the others stay.
 ///
 /// place  of the ray among those that wait: the first one is named in *cache
-/// slots  [8] of the corners, ISO_GROUP_SIZE apart
+/// slots  [8] of the corners, ISO_SCRATCH_STRIDE apart
 ISO_INLINE void request_missing(const FrameParams *frame, BlockCoords b, uint touched, uint missing,
-                                uint place, uint needed, local const uint *slots,
+                                uint place, uint needed, ISO_SCRATCH const uint *slots,
                                 global uint *slot_stamps, Requests requests,
                                 global CacheState *cache) {
   for (uint corner = 0; corner < 8; ++corner) {
     if ((touched & ~missing & 1u << corner) != 0)
-      stamp_needed(slot_stamps, slots[corner * ISO_GROUP_SIZE], needed);
+      stamp_needed(slot_stamps, slots[corner * ISO_SCRATCH_STRIDE], needed);
   }
   request_corners(frame, b, unasked_corners(frame, b, missing, requests), requests);
   if (place == 0) {

@@ -7,7 +7,6 @@
 /// values [num_blocks * 64]: block after block in the order of their ids, x + 4y + 16z in a block.
 /// Against rows of the whole volume, a cell's corners lie in two to four cache lines instead of
 /// four to eight, and a ray's next cell mostly in the same.
-#define ISO_FOUND local
 #include "device/block_stream.h"
 #include "device/block_walk.h"
 #include "portable/block_cells.h"
@@ -122,9 +121,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void resident
     const FrameParams frame_params, global const uint *macrocell_masks, global const float *values,
     global const ulong *changing, global HitRecord *hits) {
   const FrameParams *frame = &frame_params;
-  local uint found_blocks[ISO_BLOCKS_AT_ONCE *
-                          ISO_GROUP_SIZE]; /* each work-item has its own, ISO_GROUP_SIZE apart */
-  local uint *found = found_blocks + get_local_id(0);
+  ISO_SCRATCH_ARRAY(found, ISO_BLOCKS_AT_ONCE);
   const Solver solver = {ISO_SOLVER, ISO_ROOT_STEPS};
   const LastPlanes last = last_planes(frame);
   const PixelBox image = {0, 0, frame->view.width, frame->view.height};
@@ -139,9 +136,9 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void resident
     ResidentChange change;
     while (next != ISO_INVALID_ID && !hit) {
       const uint num_found = find_blocks(frame, macrocell_masks, &ray, &next, ISO_BLOCKS_AT_ONCE,
-                                         found, ISO_GROUP_SIZE);
+                                         found, ISO_SCRATCH_STRIDE);
       for (uint i = 0; i < num_found && !hit; ++i) {
-        const uint block_id = found[i * ISO_GROUP_SIZE];
+        const uint block_id = found[i * ISO_SCRATCH_STRIDE];
         hit = resident_block(frame, values, changing[block_id], &ray, block_coords(frame, block_id),
                              last, &change);
       }

@@ -16,11 +16,26 @@
 #ifndef ISO_UNROLL /* by -D: empty if it makes programs slower to compile, not to run */
 #define ISO_UNROLL _Pragma("unroll")
 #endif
-#ifdef ISO_CPU /* the host says so, of PoCL and llvmpipe: PoCL calls long functions otherwise, \
-                  which takes a fifth longer */
+#ifdef ISO_CPU /* the host says so, of PoCL and llvmpipe: PoCL would call functions in inner \
+                  loops, which takes a fifth longer */
 #define ISO_INLINE static inline __attribute__((always_inline))
+/// A long function that is called once a block or a ray. PoCL compiles the text of a kernel three
+/// times, and such a function once. Give it no pointer to local memory, which all threads would
+/// then share, and do not let it ask for its work-item.
+#define ISO_LONG static __attribute__((noinline, unused))
+/// Scratch of a work-item. On a CPU it is private. A GPU has it in local memory, elements of a
+/// work-item ISO_SCRATCH_STRIDE apart.
+#define ISO_SCRATCH private
+#define ISO_SCRATCH_STRIDE 1u
+#define ISO_SCRATCH_ARRAY(name, count) uint name[count]
 #else /* Oclgrind, too, which knows no scopes of inlined arguments */
 #define ISO_INLINE static inline
+#define ISO_LONG ISO_INLINE
+#define ISO_SCRATCH local
+#define ISO_SCRATCH_STRIDE ISO_GROUP_SIZE
+#define ISO_SCRATCH_ARRAY(name, count)                \
+  local uint name##_of_group[(count)*ISO_GROUP_SIZE]; \
+  local uint *const name = name##_of_group + get_local_id(0)
 #endif
 #else
 #include <bit>
@@ -33,6 +48,7 @@
 #define ISO_CONSTANT
 #define ISO_UNROLL
 #define ISO_INLINE static inline
+#define ISO_LONG ISO_INLINE
 #endif
 
 ISO_NAMESPACE_BEGIN
@@ -210,6 +226,14 @@ typedef struct ScreenBox {
   uint begin_x, begin_y, end_x, end_y;
 } ScreenBox;
 ISO_CHECK_SIZE(ScreenBox, 16);
+
+/// Types of the values in cache slots: integers, or masks of the groups of labels.
+#define ISO_SLOTS_FLOAT32 0u
+#define ISO_SLOTS_UINT8 1u
+#define ISO_SLOTS_INT8 2u
+#define ISO_SLOTS_UINT16 3u
+#define ISO_SLOTS_INT16 4u
+#define ISO_SLOTS_GROUPS 5u
 
 /// How passes share out rays and cache slots.
 typedef struct Schedule {

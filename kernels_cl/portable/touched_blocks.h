@@ -41,7 +41,7 @@ ISO_INLINE int in_both(LastLayer a, LastLayer b) {
 /// The corners (bits 0..7, corner x + 2y + 4z) of the dual grid of block (x,y,z) whose voxels the
 /// cells that the ray crosses in the block have. No cell need be walked: if any two of three spans
 /// overlap, all three do.
-ISO_INLINE uint touched_blocks(const Ray *r, int x, int y, int z, LastPlanes last) {
+ISO_LONG uint touched_blocks(const Ray *r, int x, int y, int z, LastPlanes last) {
   const RayEvent enter = region_entry(r, x, y, z, 4, last);
   const GridWalk block = walk_from(r, x, y, z, 4, last);
   const RayEvent exit = walk_exit(&block, r);
