@@ -48,8 +48,11 @@ std::string build_options(const DeviceInfo &device, Defines defines) {
     options += " -cl-fp32-correctly-rounded-divide-sqrt";
   if (device.type == DeviceType::kCpu)
     defines.emplace("ISO_CPU", "1");  // grid_dda.h, shared_types.h
-  // Unrolling takes PoCL half as long again, and loops run no faster for it (core/ocl/README.md).
-  if (device.platform == "Portable Computing Language") defines.emplace("ISO_UNROLL", "");
+  if (device.platform == "Portable Computing Language") {
+    // Unrolling takes PoCL half as long again, and loops run no faster for it.
+    defines.emplace("ISO_UNROLL", "");
+    defines.emplace("ISO_CALLS", "1");  // shared_types.h
+  }
   const auto has_space = [](const std::string &text) {
     return std::ranges::any_of(text, [](unsigned char c) { return std::isspace(c) != 0; });
   };

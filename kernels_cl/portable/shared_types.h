@@ -19,17 +19,20 @@
 #ifdef ISO_CPU /* the host says so, of PoCL and llvmpipe: PoCL would call functions in inner \
                   loops, which takes a fifth longer */
 #define ISO_INLINE static inline __attribute__((always_inline))
+#else /* Oclgrind, too, which knows no scopes of inlined arguments */
+#define ISO_INLINE static inline
+#endif
+#ifdef ISO_CALLS /* the host says so, of PoCL */
 /// A long function that is called once a block or a ray. PoCL compiles the text of a kernel three
 /// times, and such a function once. Give it no pointer to local memory, which all threads would
 /// then share, and do not let it ask for its work-item.
 #define ISO_LONG static __attribute__((noinline, unused))
-/// Scratch of a work-item. On a CPU it is private. A GPU has it in local memory, elements of a
-/// work-item ISO_SCRATCH_STRIDE apart.
+/// Scratch of a work-item: private on PoCL, else in local memory, elements of a work-item
+/// ISO_SCRATCH_STRIDE apart. Private arrays are slow on GPUs, and slow to compile on llvmpipe.
 #define ISO_SCRATCH private
 #define ISO_SCRATCH_STRIDE 1u
 #define ISO_SCRATCH_ARRAY(name, count) uint name[count]
-#else /* Oclgrind, too, which knows no scopes of inlined arguments */
-#define ISO_INLINE static inline
+#else
 #define ISO_LONG ISO_INLINE
 #define ISO_SCRATCH local
 #define ISO_SCRATCH_STRIDE ISO_GROUP_SIZE
