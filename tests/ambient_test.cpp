@@ -258,10 +258,11 @@ TEST_P(AmbientOnDevice, CancelledRoundsLeaveNoTrace) {
   const FrameStats whole = renderer.render(request);
   const std::uint32_t before = std::uint32_t(whole.passes.size()) + whole.normals.passes;
   std::set<std::uint32_t> shown;
-  for (std::uint32_t left = 0; left < 4; ++left) {
+  // After any number of passes: on a GPU, frames of so few slots do not all take as many.
+  for (std::uint32_t stop = before / 2;; ++stop) {
     renderer.clear_cache();
     std::uint32_t passes = 0;
-    request.on_pass = [&](const PassStats &) { return passes++ < before + 2 * left; };
+    request.on_pass = [&](const PassStats &) { return passes++ < stop; };
     const FrameStats stats = renderer.render(request);
     if (!stats.cancelled) break;
     if (stats.ambient.passes > 0) {

@@ -8,7 +8,6 @@
 
 #include "core/base/error.hpp"
 #include "core/base/ms_since.hpp"
-#include "core/base/parallel_for.hpp"
 #include "core/ocl/arithmetic.hpp"
 #include "core/ocl/build_log.hpp"
 #include "core/ocl/device_list.hpp"
@@ -171,23 +170,6 @@ const cl::Program &Device::program(std::string_view stem, const Defines &defines
       context_->program(key, [&] { return build_program(context(), device_, info_, key); });
   programs_.emplace(std::move(key), &program);
   return program;
-}
-
-void Device::expect(std::string_view stem, const Defines &defines) {
-  if (info_.type == DeviceType::kGpu) expected_.insert(key_of(stem, defines));
-}
-
-void Device::build_expected() {
-  const Compiling now = compiling();
-  const std::vector<ProgramKey> keys(expected_.begin(), expected_.end());
-  expected_.clear();
-  parallel_for(keys.size(), 0, [&](std::uint64_t i, std::uint32_t) {
-    try {
-      context_->program(keys[i], [&] { return build_program(context(), device_, info_, keys[i]); });
-    } catch (const Error &) {
-      return;  // to be thrown again by program()
-    }
-  });
 }
 
 cl::Program Device::build(std::string_view stem, const Defines &defines) {

@@ -11,7 +11,6 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <set>
 #include <span>
 #include <string>
 #include <string_view>
@@ -115,12 +114,6 @@ class Device {
   /// Throws  BuildError: it does not build
   const cl::Program &program(std::string_view stem, const Defines &defines = {});
 
-  /// Kernels of this program are likely to be launched.
-  void expect(std::string_view stem, const Defines &defines);
-  /// Builds the expected programs together, if the driver builds on several processors at a time. A
-  /// program that does not build fails when it is asked for.
-  void build_expected();
-
   /// A program of its own, which the device does not keep.
   ///
   /// Throws  as program()
@@ -187,7 +180,6 @@ class Device {
   MemoryLedger ledger_;
   StageTimer timer_;
   std::map<ProgramKey, const cl::Program *> programs_;
-  std::set<ProgramKey> expected_;
   std::function<void(std::string_view)> on_new_kernel_;
   std::string notice_;
   double compile_ms_ = 0;

@@ -40,15 +40,9 @@ void DeviceContext::keep_all() {
 
 const cl::Program &DeviceContext::program(const ProgramKey &key,
                                           const std::function<cl::Program()> &build) {
-  Program &known = entry(key);
-  const std::lock_guard lock(known.mutex);
-  if (known.program() == nullptr) known.program = build();
-  return known.program;
-}
-
-DeviceContext::Program &DeviceContext::entry(const ProgramKey &key) {
   const std::lock_guard lock(mutex_);
-  return programs_[key];
+  if (const auto found = programs_.find(key); found != programs_.end()) return found->second;
+  return programs_.emplace(key, build()).first->second;
 }
 
 void DeviceContext::abandon() noexcept {

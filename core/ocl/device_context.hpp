@@ -31,8 +31,7 @@ class DeviceContext {
 
   explicit DeviceContext(const cl::Device &device) : context(device) {}
 
-  /// The program with this key. The first caller builds it; others wait for it, or build programs
-  /// of other keys at the same time. Valid as long as *this.
+  /// The program with this key. The first caller builds it; others wait. Valid as long as *this.
   ///
   /// Throws  what `build` throws
   const cl::Program &program(const ProgramKey &key, const std::function<cl::Program()> &build);
@@ -43,14 +42,8 @@ class DeviceContext {
   const cl::Context context;
 
  private:
-  struct Program {
-    std::mutex mutex;
-    cl::Program program;  ///< null until it is built
-  };
-  Program &entry(const ProgramKey &key);
-
   std::mutex mutex_;
-  std::map<ProgramKey, Program> programs_;
+  std::map<ProgramKey, cl::Program> programs_;
 };
 
 }  // namespace isowave::core::ocl

@@ -5,8 +5,8 @@
 //   Kernel<kernels::scale_values> scale_{device};
 //   scale_(Range::strided(count, 64, device), input, count, factor, output);
 //
-// Its program is built when it is first launched, so that what is not used is not built, or by
-// Device::build_expected(). Code that times launches does one before that has nothing to do.
+// Its program is built when it is first launched, so that what is not used is not built. Code that
+// times launches does one before that has nothing to do.
 
 #include <CL/opencl.hpp>
 #include <algorithm>
@@ -76,9 +76,7 @@ struct Range {
 class RawKernel {
  public:
   RawKernel(Device &device, std::string_view stem, const char *kernel_name, const Defines &defines)
-      : device_(&device), stem_(stem), name_(kernel_name), defines_(defines) {
-    device.expect(stem, defines);
-  }
+      : device_(&device), stem_(stem), name_(kernel_name), defines_(defines) {}
 
  protected:
   /// Makes the kernel, unless that has been done; its program, too. If the device gives the kernel

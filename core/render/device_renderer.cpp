@@ -199,7 +199,6 @@ DeviceRenderer::DeviceRenderer(ocl::Device &device, const CompressedVolume &volu
 /// behind, which every frame clears.
 void DeviceRenderer::compile_kernels() {
   const auto compiling = device_.compiling();
-  device_.build_expected();
   Wavefront &rays = rays_;
   rays.frame = {};
   rays.frame.view.width = rays.frame.view.height = rays.frame.schedule.max_spec_count = 1;
