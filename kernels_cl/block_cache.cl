@@ -319,7 +319,7 @@ kernel void cache_rebuild(const FrameParams frame_params, global const PassCount
   }
 }
 
-/// Which of a slot's values, which have this type, are not below the isovalue.
+/// Sets the bits of a slot's values that are not below the isovalue. They have this type.
 #define ISO_NOT_BELOW(type)                   \
   for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v) \
   bits |= (ulong)((float)((global const type *)values)[v] - isovalue >= 0.0f) << v
