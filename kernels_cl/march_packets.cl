@@ -461,8 +461,8 @@ ISO_INLINE void draw_packet(Packet *p, const PacketScene *scene, global const Cl
 }
 #endif
 
-/// Draws the packets of a tile of the picture; or, unless the rays begin, as many of the list
-/// active_ray_ids [num_rays].
+/// If rays begin, draws the packets of a tile of the picture. Otherwise draws ISO_LIST_PACKETS
+/// packets of the list active_ray_ids [num_rays].
 ISO_LONG void draw_chunk(const PacketScene *scene, global const ClipParams *clip,
                          int is_active_somewhere, uint begins, global const uint *active_ray_ids,
                          uint num_rays, uint chunk, LaunchRays *rays) {

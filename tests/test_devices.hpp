@@ -27,10 +27,10 @@ inline void PrintTo(const DeviceInfo &info, std::ostream *out) {
 
 /// The device that ISOWAVE_DEVICE chooses when it is set, else every device. Empty when there is
 /// none: GoogleTest then fails the suite, since a suite that is instantiated with nothing is an
-/// error. Devices keep their programs from case to case, but llvmpipe.
+/// error. Devices other than llvmpipe keep their programs from case to case.
 inline std::vector<ocl::DeviceInfo> devices_under_test() {
   const char *chosen = std::getenv("ISOWAVE_DEVICE");
-  // Mesa's kernels would take 2 GB.
+  // With llvmpipe's kernels kept, the process had 2 GB.
   if (!chosen || std::string_view(chosen) != "llvmpipe") ocl::DeviceContext::keep_all();
   if (chosen && *chosen) return {ocl::choose_device()};
   return ocl::list_devices();

@@ -168,7 +168,7 @@ TEST_P(TransparentOnDevice, PicturesSoFar) {
   RendererOptions few_slots = options(size);
   few_slots.cache_slots = 60;
   DeviceRenderer on_device(device_, volume_.compressed, few_slots);
-  // Bands are the higher the more threads there are.
+  // With many threads, a band would be the whole picture.
   HostRenderer on_host(volume_.compressed, {.num_threads = 1, .largest = size});
   FrameRequest request{.camera = camera_, .isovalue = kIsovalue};
   on_host.render(request);

@@ -170,7 +170,7 @@ class Device {
   bool settle() noexcept;
 
  private:
-  /// With all macros that the program's text knows.
+  /// With the macros that the program's text names, and no others.
   ProgramKey key_of(std::string_view stem, const Defines &defines) const;
 
   DeviceInfo info_;
