@@ -133,9 +133,14 @@ FrameReport make_report(const Options &options, const CompressedVolume &volume,
   tools::read_light(options.light, light);
   report.light = core_appearance(light, volume.info);
   report.shadow_rays = light.shadow_rays;
+  report.bounce_rays = light.bounce_rays;
   report.light_angle = light.light_angle;
-  if (!options.field.empty()) report.light.color_by_field = {.colors = color_map("viridis")};
+  const bool by_label = options.field == "labels";
+  if (!options.field.empty())
+    report.light.color_by_field = {.colors = color_map(by_label ? "labels" : "viridis"),
+                                   .labels = by_label};
   report.options.with_given_rays = options.ambient_rays != 0 || light.shadow_rays != 0;
+  report.options.with_bounce = light.bounce_rays != 0;
   report.num_views = options.orbit;
   report.rounds = options.rounds;
   return report;
@@ -145,10 +150,11 @@ FrameReport measure(const Options &options, std::string command) {
   const ocl::DeviceInfo device_info = ocl::choose_device(options.device);
   const CompressedVolume volume = load(options.volume, options, device_info);
   CompressedVolume field;
-  if (!options.field.empty()) field = load(options.field, options, device_info);
+  const bool is_own = options.field == "labels", has_field = !options.field.empty();
+  if (has_field && !is_own) field = load(options.field, options, device_info);
   const std::vector<Camera> cameras = orbit_cameras(volume.info, options.orbit);
   FrameReport report = make_report(options, volume, std::move(command));
-  if (!options.field.empty()) report.options.field = &field;
+  if (has_field) report.options.field = is_own ? &volume : &field;
   std::vector<HitRecord> first_hits;
   {
     ocl::Device device(device_info);
@@ -158,9 +164,8 @@ FrameReport measure(const Options &options, std::string command) {
     report.setup_ms = renderer.setup_ms();
     renderer.render(seen_from(cameras.front(), report.request()));
     if (options.resident) {
-      FrameRequest of_cells = report.request();
+      FrameRequest of_cells = without_light_rays(report.request());
       of_cells.normals = Normals::kCell;  // as the floor draws
-      of_cells.ambient_rays = of_cells.shadow_rays = 0;
       of_cells.field_values = false;
       of_cells.surfaces.clear();
       of_cells.slices = {};
@@ -293,8 +298,9 @@ void add_options(CLI::App &app, Options &options) {
   app.get_option("--labels")->excludes("--surfaces", "--voxel-pixels", "--budgets");
   tools::add_light_options(app, options.light);
   app.add_option("--values-of", options.field,
-                 "second volume, whose values at the hits colour surfaces")
-      ->excludes("--budgets", "--labels");
+                 "second volume, whose values at the hits colour surfaces; or `labels`: with "
+                 "--labels, each label has its colour")
+      ->excludes("--budgets");
   app.add_flag("--depth", options.depth, "bring the picture's depth to the host, too");
   app.add_option("--max-passes", options.max_passes,
                  "of --budgets: a budget at which a frame takes more is not timed")

@@ -249,6 +249,7 @@ ordered_json options_json(const FrameReport &report) {
   json["normals"] = to_string(report.normals);
   json["ambient"] = report.ambient_rays;
   json["shadow"] = report.shadow_rays;
+  json["bounce"] = report.bounce_rays;
   json["slices"] = report.slices.planes.size();
   json["has_field"] = report.light.color_by_field.has_value();
   json["depth"] = report.wanted.depth;

@@ -26,7 +26,7 @@ struct FrameReport {
   std::vector<SurfaceStyle> surfaces{};
   Slices slices{};
   Appearance light{};
-  std::uint32_t shadow_rays = 0;
+  std::uint32_t shadow_rays = 0, bounce_rays = 0;
   double light_angle = 3;
   WantedArrays wanted{.picture = true};
   RendererOptions options;
@@ -50,8 +50,10 @@ struct FrameReport {
             .voxel_pixels = voxel_pixels,
             .normals = normals,
             .field_values = light.color_by_field.has_value(),
+            .field_labels = light.color_by_field && light.color_by_field->labels,
             .ambient_rays = ambient_rays,
             .shadow_rays = shadow_rays,
+            .bounce_rays = bounce_rays,
             .light_angle = light_angle};
   }
 };

@@ -7,20 +7,13 @@
 /// the opaque surfaces: it goes through pipeline `rays` once for each, and ambient_block takes out
 /// what has met one.
 #include "device/level_borders.h"
+#include "device/light_rays.h"
 #include "portable/ambient.h"
-#include "portable/clip.h"
 #include "portable/layers.h"
 
 #ifndef ISO_PLACED_HITS   /* by -D */
 #define ISO_PLACED_HITS 0 /* 1: hits are placed_hit()s, of whatever brick */
 #endif
-
-/// Has a ray met what is clipped?
-ISO_INLINE int meets_clipped(const FrameParams *frame, global const ClipParams *clip,
-                             uint first_level, GivenRay given, HitRecord met) {
-  const float in_first = (float)(1u << given.level), voxel = (float)(1u << first_level) * in_first;
-  return is_clipped(clip, given, voxel, met.t / (frame->view.t_scale * in_first));
-}
 
 /// frame_params, frames, num_frames  as start_rays
 /// clip [1]    of the frame
@@ -53,9 +46,7 @@ kernel void ambient(const FrameParams frame_params, global const FrameParams *fr
       continue;
     }
     if (round != 0 && is_given(given[pixel])) {
-      const int meets = given_hits[pixel].t != INFINITY &&
-                        (clip->num_planes == 0 ||
-                         !meets_clipped(frame, clip, first_level, given[pixel], given_hits[pixel]));
+      const int meets = meets_surface(frame, clip, first_level, given[pixel], given_hits[pixel]);
       const uint place = counts_lit ? num_pixels + pixel : pixel;
       open_counts[place] = (uchar)(open_counts[place] + !meets);
     }

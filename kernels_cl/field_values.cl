@@ -10,8 +10,23 @@
 #include "portable/field_value.h"
 #include "portable/ray_state.h"
 
+/// The value at a hit, of cached blocks. A function of its own: inlined into the kernel, PoCL 5
+/// does not compile it.
+ISO_LONG float cached_value(global const FieldMap *map, global const uint *label_table,
+                            HitRecord hit, const FieldPlace *place, const CachedStencil *cached) {
+  float corners[8];
+  ISO_UNROLL
+  for (int c = 0; c < 8; ++c) {
+    corners[c] =
+        stencil_voxel(cached, place->x + (c & 1), place->y + (c >> 1 & 1), place->z + (c >> 2));
+  }
+  return value_of_hit(map, label_table, hit, corners, place->at);
+}
+
 /// frame_params  view and screen of the frame; grid and schedule of the field
 /// parts         as start_rays
+/// label_table   [ISO_NUM_LABELS / 4] see groups_of_label(); not read unless map->labels is
+///               ISO_FIELD_OWN_LABELS
 /// begins  1: all hits. 0: the hits of the list
 /// prev    counts of the pass before
 /// In      map [1]; hits [pixel]; active_ray_ids [prev->next_active_count], unless it begins
@@ -23,8 +38,8 @@
 /// Launch  groups of ISO_GROUP_SIZE, which stride over the tiles of the screen box, or the list,
 ///         in parts as start_rays
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void field_values(
-    const FrameParams frame_params, global const FieldMap *map, uint parts, uint begins,
-    global const BlockEntry *table, global const SlotValue *cache_values,
+    const FrameParams frame_params, global const FieldMap *map, global const uint *label_table,
+    uint parts, uint begins, global const BlockEntry *table, global const SlotValue *cache_values,
     global const PassCounts *prev, global PassCounts *counts, global PassCounts *next_counts,
     global const uint *active_ray_ids, global uint *next_active_ray_ids,
     global const HitRecord *hits, global float *field_values, global uint *slot_stamps,
@@ -67,13 +82,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void field_va
         missing = touched & ~find_slots(frame, table, base, touched, slots);
         if (missing == 0) {
           const CachedStencil cached = {cache_values, slots, base, 0};
-          float corners[8];
-          ISO_UNROLL
-          for (int c = 0; c < 8; ++c) {
-            corners[c] = stencil_voxel(&cached, place.x + (c & 1), place.y + (c >> 1 & 1),
-                                       place.z + (c >> 2));
-          }
-          field_values[pixel] = field_value(corners, place.at);
+          field_values[pixel] = cached_value(map, label_table, hits[pixel], &place, &cached);
           /* The stamp of a block stands for the next ones along the axes, too (last_use()). */
           stamp_read(slot_stamps, slots[0], read_stamp(pass));
         } else {

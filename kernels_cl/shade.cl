@@ -4,16 +4,18 @@
 #include "portable/shade.h"
 
 /// In      color_map [ISO_MAP_COLORS]; hits [height * width]; open_counts, num_ambient,
-///         num_shadow, field_values: see shade_pixel()
+///         num_shadow, bounced, num_bounced: see LightOfHits; field_values: see shade_pixel()
 /// Out     bytes: RGBA [height / samples][width / samples][4] if with_alpha is not 0, else RGB [3];
 ///         8 bits each. Pixels are rounded up to a multiple of four, by pixels of 0
 /// Launch  grid-stride over four pixels
 kernel void shade(const FrameParams frame_params, const ShadeParams shade_params,
                   global const uint *color_map, uint samples, global const HitRecord *hits,
                   global const uchar *open_counts, uint num_ambient, uint num_shadow,
-                  global const float *field_values, uint with_alpha, global void *bytes) {
+                  global const float *bounced, uint num_bounced, global const float *field_values,
+                  uint with_alpha, global void *bytes) {
   global uint *image = (global uint *)bytes;
   const FrameParams *frame = &frame_params;
+  const LightOfHits light = {open_counts, num_ambient, num_shadow, bounced, num_bounced};
   const uint columns = frame->view.width / samples, rows = frame->view.height / samples;
   const uint num_pixels = columns * rows,
              num_items = (num_pixels + ISO_PIXELS_OF_ITEM - 1) / ISO_PIXELS_OF_ITEM;
@@ -21,10 +23,10 @@ kernel void shade(const FrameParams frame_params, const ShadeParams shade_params
     uint rgba[ISO_PIXELS_OF_ITEM];
     for (uint i = 0; i < ISO_PIXELS_OF_ITEM; ++i) {
       const uint pixel = ISO_PIXELS_OF_ITEM * item + i;
-      rgba[i] = pixel < num_pixels ? shade_pixel(frame, &shade_params, color_map, samples,
-                                                 pixel % columns, pixel / columns, hits,
-                                                 open_counts, num_ambient, num_shadow, field_values)
-                                   : 0;
+      rgba[i] = pixel < num_pixels
+                    ? shade_pixel(frame, &shade_params, color_map, samples, pixel % columns,
+                                  pixel / columns, hits, &light, field_values)
+                    : 0;
     }
     store_pixels(rgba, with_alpha, image, item);
   }

@@ -1,12 +1,12 @@
 #include "reference/field_twin.hpp"
 
-#include "core/frame/field_values.hpp"
 #include "core/zfp/libzfp.hpp"
 
 namespace isowave::core {
 
-float value_at_hit(const FieldMap &map, const glm::uvec3 &dims, std::span<const float> voxels,
-                   const HitRecord &hit) {
+float value_at_hit(const FieldReading &reading, const glm::uvec3 &dims,
+                   std::span<const float> voxels, const HitRecord &hit) {
+  const FieldMap &map = reading.map;
   const FieldPlace place = field_place(&map, hit);
   if (!is_in_field(place)) return no_value();
   float corners[8];
@@ -16,19 +16,19 @@ float value_at_hit(const FieldMap &map, const glm::uvec3 &dims, std::span<const 
                z = static_cast<uint>(place.z + (c >> 2));
     corners[c] = voxels[x + std::size_t{dims.x} * (y + std::size_t{dims.y} * z)];
   }
-  return field_value(corners, place.at);
+  return value_of_hit(&map, reading.label_table.data(), hit, corners, place.at);
 }
 
 FieldTwin::FieldTwin(const CompressedVolume &field)
     : info_(field.info), range_(known_range(field)), voxels_(decode_with_libzfp(field)) {}
 
 std::vector<float> FieldTwin::values(std::span<const VolumeInfo> levels,
-                                     std::span<const HitRecord> hits, bool on_caps) const {
-  FieldMap map = make_field_map(levels, info_);
-  map.caps_alone = on_caps ? 1 : 0;
+                                     std::span<const HitRecord> hits,
+                                     const FrameRequest &request) const {
+  const FieldReading reading = reading_of(request, make_field_map(levels, info_), false);
   std::vector<float> values(hits.size(), no_value());
   for (std::size_t i = 0; i < hits.size(); ++i)
-    values[i] = value_at_hit(map, info_.dims, voxels_, hits[i]);
+    values[i] = value_at_hit(reading, info_.dims, voxels_, hits[i]);
   return values;
 }
 

@@ -5,14 +5,13 @@
 #include <span>
 #include <vector>
 
-#include "core/zfp/zfp_stream.hpp"
-#include "kernels_cl/portable/field_value.h"
+#include "core/frame/field_values.hpp"
 
 namespace isowave::core {
 
 /// The value at a hit of voxels, x fastest; NaN: it has none.
-float value_at_hit(const FieldMap &map, const glm::uvec3 &dims, std::span<const float> voxels,
-                   const HitRecord &hit);
+float value_at_hit(const FieldReading &reading, const glm::uvec3 &dims,
+                   std::span<const float> voxels, const HitRecord &hit);
 
 class FieldTwin {
  public:
@@ -20,9 +19,10 @@ class FieldTwin {
   explicit FieldTwin(const CompressedVolume &field);
 
   /// levels   of the volume that has the hits, the finest first
+  /// request  of their frame
   /// Returns  [hit] NaN: it has no value
   std::vector<float> values(std::span<const VolumeInfo> levels, std::span<const HitRecord> hits,
-                            bool on_caps = false) const;
+                            const FrameRequest &request = {}) const;
   /// The field's least and largest values; none if they are not known.
   std::optional<std::array<float, 2>> volume_range() const { return range_; }
 

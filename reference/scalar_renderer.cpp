@@ -10,6 +10,7 @@
 #include "core/base/parallel_for.hpp"
 #include "core/frame/ambient_rays.hpp"
 #include "core/view/detail.hpp"
+#include "kernels_cl/portable/bounce.h"
 #include "kernels_cl/portable/cell_intersect.h"
 #include "kernels_cl/portable/clip.h"
 #include "kernels_cl/portable/layers.h"
@@ -318,17 +319,43 @@ void smooth_gradients(std::span<const FrameParams> frames,
   });
 }
 
-std::vector<uchar> count_open(std::span<const FrameParams> frames,
-                              std::span<const VolumeInfo> levels,
-                              std::span<const std::vector<float>> voxels,
-                              std::span<const HitRecord> hits, const LightRays &rays, Solver solver,
-                              unsigned threads, const ClipParams &clip) {
+namespace {
+
+void filter_bounced(const FrameParams &seen, const AmbientParams &params,
+                    std::span<const HitRecord> hits, std::vector<float> &bounced) {
+  std::vector<GivenRay> places(hits.size());
+  for (uint ray = 0; ray < hits.size(); ++ray)
+    places[ray] = normal_ray(&seen, &params, ray, hits[ray]);
+  for (uint step = 0; step < ISO_BOUNCE_STEPS; ++step) {
+    const std::vector<float> before = bounced;
+    for (uint ray = 0; ray < hits.size(); ++ray)
+      bounced[ray] = filtered_light(seen.view.width, seen.view.height, places.data(), before.data(),
+                                    ray, 1u << step);
+  }
+}
+
+}  // namespace
+
+OpenCounts open_of(std::span<const FrameParams> frames, std::span<const VolumeInfo> levels,
+                   std::span<const std::vector<float>> voxels, std::span<const HitRecord> hits,
+                   const LightRays &rays, Solver solver, unsigned threads, const ClipParams &clip) {
   const std::size_t first =
       static_cast<std::size_t>(std::ranges::find_if(frames, draws) - frames.begin());
   const FrameParams &seen = frames[first];
   const AmbientParams params = make_ambient_params(levels[first], rays.num_ambient);
   const std::vector<AmbientDirection> directions = make_light_directions(rays);
-  std::vector<uchar> counts((rays.num_shadow != 0 ? 2 : 1) * hits.size());
+  OpenCounts open{std::vector<uchar>((rays.num_shadow != 0 ? 2 : 1) * hits.size()),
+                  rays.num_ambient, rays.num_shadow};
+  if (rays.bounces) {
+    open.bounced.resize(hits.size());
+    open.num_bounced = rays.num_ambient;
+  }
+  const auto meets = [&](const GivenRay &given, std::size_t level, HitRecord *met) {
+    *met = trace(frames[level], voxels[level].data(), solver, make_given_ray(given));
+    return std::isfinite(met->t) &&
+           !is_clipped(&clip, given, std::ldexp(1.0f, static_cast<int>(level)),
+                       met->t / frames[level].view.t_scale);
+  };
   parallel_for(seen.view.height, threads, [&](std::uint64_t row, std::uint32_t) {
     for (uint column = 0; column < seen.view.width; ++column) {
       const uint pixel = static_cast<uint>(row) * seen.view.width + column;
@@ -344,17 +371,22 @@ std::vector<uchar> count_open(std::span<const FrameParams> frames,
             ambient_ray(&seen, &params, placed, pixel, k,
                         directions[k * ISO_AMBIENT_PATTERNS + ambient_pattern(&seen, pixel)]);
         if (!is_given(given)) continue;
-        const HitRecord met =
-            trace(frames[level], voxels[level].data(), solver, make_given_ray(given));
-        const bool is_open = !std::isfinite(met.t) ||
-                             is_clipped(&clip, given, std::ldexp(1.0f, static_cast<int>(level)),
-                                        met.t / frames[level].view.t_scale);
-        uchar &count = counts[pixel + (is_shadow_ray(&params, k) ? hits.size() : 0)];
+        HitRecord met;
+        const bool is_shadow = is_shadow_ray(&params, k), is_open = !meets(given, level, &met);
+        uchar &count = open.counts[pixel + (is_shadow ? hits.size() : 0)];
         count = static_cast<uchar>(count + is_open);
+        if (is_open || is_shadow || !rays.bounces) continue;
+        const std::size_t lit_by = rays.num_ambient + light_row(rays.num_shadow, k);
+        float cosine = 0;
+        const GivenRay to_light = bounce_ray(
+            &params, given, placed_hit(&frames[level], static_cast<uint>(level - first), met),
+            directions[lit_by * ISO_AMBIENT_PATTERNS + ambient_pattern(&seen, pixel)], &cosine);
+        if (is_given(to_light) && !meets(to_light, level, &met)) open.bounced[pixel] += cosine;
       }
     }
   });
-  return counts;
+  if (rays.bounces) filter_bounced(seen, params, hits, open.bounced);
+  return open;
 }
 
 void smooth_gradients(const FrameParams &frame, std::span<const float> voxels,

@@ -41,16 +41,13 @@ void smooth_gradients(std::span<const FrameParams> frames,
 void smooth_gradients(const FrameParams &frame, std::span<const float> voxels,
                       std::span<HitRecord> hits);
 
-/// How many ambient rays of each hit meet nothing (kernels_cl/portable/ambient.h), and behind these
-/// counts, how many shadow rays, if there are any; 0 if there is no hit. What a ray meets behind a
-/// clipping plane does not count. The arguments are those of render_scalar_levels(), and the
-/// levels' infos.
-std::vector<uchar> count_open(std::span<const FrameParams> frames,
-                              std::span<const VolumeInfo> levels,
-                              std::span<const std::vector<float>> voxels,
-                              std::span<const HitRecord> hits, const LightRays &rays,
-                              Solver solver = kDefaultSolver, unsigned threads = 0,
-                              const ClipParams &clip = {});
+/// How many ambient and shadow rays of each hit meet nothing (kernels_cl/portable/ambient.h), and
+/// the light that bounces (bounce.h); 0 if there is no hit. What a ray meets behind a clipping
+/// plane does not count. The arguments are those of render_scalar_levels(), and the levels' infos.
+OpenCounts open_of(std::span<const FrameParams> frames, std::span<const VolumeInfo> levels,
+                   std::span<const std::vector<float>> voxels, std::span<const HitRecord> hits,
+                   const LightRays &rays, Solver solver = kDefaultSolver, unsigned threads = 0,
+                   const ClipParams &clip = {});
 
 /// One ray of the same: rays [level], which is the same ray in each level's index space, with its
 /// interval there.

@@ -175,7 +175,7 @@ LayeredFrame Twin::render_layers(const FrameRequest &request, const FieldTwin *f
     const SurfaceStyle &surface = surfaces[order[k]];
     if (surface.opacity == 1) lights.add({frames[k], surface.clipped ? clip : ClipParams{}});
   }
-  const FieldMap map = make_field_map({&finest, 1}, finest);
+  const FieldReading of_slices{make_field_map({&finest, 1}, finest)};
   const uint num_slices = colors.slices.num_planes;
   const std::size_t num_rays = request.size->num_rays();
   LayeredFrame result;
@@ -212,9 +212,9 @@ LayeredFrame Twin::render_layers(const FrameRequest &request, const FieldTwin *f
       if (request.normals == Normals::kSmooth) smooth_gradients(frames[0], voxels_[0], {&hit, 1});
       float value = no_value();
       if (is_of_slice(&colors, hit)) {
-        value = value_at_hit(map, finest.dims, voxels_[0], hit);
+        value = value_at_hit(of_slices, finest.dims, voxels_[0], hit);
       } else if (has_field) {
-        value = field->values({&finest, 1}, {&hit, 1}, request.field_on_caps)[0];
+        value = field->values({&finest, 1}, {&hit, 1}, request)[0];
       }
       if (is_unseen(&colors, hit, value)) continue;
       result.layers[layer][i] = hit;
@@ -236,9 +236,8 @@ OpenCounts Twin::open(const Camera &camera, ImageSize size, float isovalue,
                       const Clip &clip) const {
   const std::vector<FrameParams> frames =
       make_level_frames(levels_, camera, size, isovalue, voxel_pixels_);
-  return {count_open(frames, levels_, voxels_, hits, rays, solver, 0,
-                     make_clip_params(levels_[0], frames[0].view, camera, clip)),
-          rays.num_ambient, rays.num_shadow};
+  return open_of(frames, levels_, voxels_, hits, rays, solver, 0,
+                 make_clip_params(levels_[0], frames[0].view, camera, clip));
 }
 
 }  // namespace isowave::core

@@ -18,9 +18,9 @@ Abilities TwinRenderer::abilities() const {
   abilities.levels = true;
   abilities.fewer_planes = true;
   abilities.bounds = true;
-  abilities.given_rays = true;
+  abilities.given_rays = abilities.bounce = true;
   abilities.clipping = true;
-  abilities.field = field_.has_value();
+  abilities.field = abilities.field_labels = field_.has_value();
   if (solver_.kind == kDefaultSolver.kind) abilities.most_surfaces = ISO_MAX_SURFACES;
   abilities.solver = solver_;
   return abilities;
@@ -57,7 +57,7 @@ FrameStats TwinRenderer::render(const FrameRequest &request) {
   }
   field_values_.clear();
   if (request.surfaces.empty() && request.field_values)
-    field_values_ = field_->values(levels(), hits_, request.field_on_caps);
+    field_values_ = field_->values(levels(), hits_, request);
   if (request.surfaces.empty() && rays.count() != 0)
     open_ =
         twin_->open(request.camera, size_, request.isovalue, hits_, rays, solver_, request.clip);

@@ -37,6 +37,8 @@ class TwinRenderer : public Renderer {
   FrameArrays fetch(const WantedArrays &wanted, const Appearance &appearance) override;
   std::vector<HitRecord> hits() override;
   bool has_field_values() const override { return !field_values_.empty(); }
+  /// The light that the last frame's rays have found.
+  const OpenCounts &open() const { return open_; }
   std::optional<std::array<float, 2>> field_range() override;
   /// [height * width] Values of the field, if the last frame had FrameRequest::field_values.
   const std::vector<float> &field_values() const { return field_values_; }

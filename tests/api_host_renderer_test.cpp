@@ -33,6 +33,26 @@ TEST(ApiHostRenderer, DrawsWithinErrorsAndTimes) {
   EXPECT_NE(frame_of([](FrameRequest &r) { r.bound = FieldBound::kLower; }).picture, picture);
   EXPECT_EQ(frame_of([](FrameRequest &r) { r.want_bounds = true; }).bounds.size(), 64u * 48u);
   EXPECT_TRUE(frame_of([](FrameRequest &r) { r.max_surface_error = 2; }).detail.has_value());
+  const Frame within = frame_of([](FrameRequest &r) {
+    r.size.samples = 8;
+    r.max_image_error = 0.02;
+    r.want_depth = true;
+    r.want_bounds = true;
+  });
+  const std::uint32_t samples = within.detail.value().image.value().samples;
+  EXPECT_GT(samples, 1u);
+  EXPECT_LT(samples, 8u);
+  EXPECT_EQ(within.size.samples, samples);
+  EXPECT_EQ(within.rows, 48 * samples);
+  EXPECT_EQ(within.depth.size(), 64u * 48u * samples * samples);
+  EXPECT_EQ(within.bounds.size(), within.depth.size());
+  const Frame same = frame_of([&](FrameRequest &r) {
+    r.size.samples = samples;
+    r.voxel_pixels = within.detail->voxel_pixels;
+    r.want_depth = true;
+  });
+  EXPECT_EQ(within.picture, same.picture);
+  EXPECT_EQ(within.depth, same.depth);
   EXPECT_EQ(frame_of([](FrameRequest &r) { r.time_budget_ms = 1e9; }).picture, picture);
 }
 
@@ -49,6 +69,7 @@ TEST(ApiHostRenderer, RefusesBadRequestsInOneLine) {
     EXPECT_EQ(renderer.render(good).picture, picture) << text;
   };
   expect_error("0 pixels", [](FrameRequest &r) { r.max_surface_error = 0; });
+  expect_error("up to 1", [](FrameRequest &r) { r.max_image_error = 2; });
   expect_error("in -1 ms", [](FrameRequest &r) { r.time_budget_ms = -1; });
   EXPECT_THAT(error_of([] { make_host_renderer(nullptr); }), HasSubstr("needs a volume"));
   EXPECT_THAT(error_of([] { make_host_renderer(public_volume(), {.memory_limit = 1000}); }),

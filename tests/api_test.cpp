@@ -230,6 +230,9 @@ TEST_P(ApiOnDevice, FramesKeepErrorsAndTimes) {
   EXPECT_FALSE(bounded.detail->sample);
   request.by = Evidence::kProof;
   request.max_surface_error.reset();
+  request.max_image_error = 0.5;
+  EXPECT_THAT(error_of([&] { renderer.render(request); }), HasSubstr("65536 rays"));
+  request.max_image_error.reset();
   const std::vector<float> depth = renderer.render(request).depth;
   request.time_budget_ms = 1e6;
   const Frame timed = renderer.render(request);

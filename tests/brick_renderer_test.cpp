@@ -10,6 +10,7 @@
 #include <functional>
 #include <optional>
 #include <thread>
+#include <tuple>
 
 #include "core/accuracy/bounded_renderer.hpp"
 #include "core/accuracy/certify.hpp"
@@ -239,6 +240,16 @@ TEST_P(BrickTeamOnDevice, Shadows) {
       EXPECT_TRUE(rank != 0 || image.pixels == whole.pixels);
     }
     EXPECT_TRUE(rank != 0 || num_images > 3);
+  });
+}
+
+TEST_P(BrickTeamOnDevice, BouncedLightIsRefused) {
+  const RendererOptions options{.size = kFrame, .with_bounce = true};
+  request_.bounce_rays = 1;
+  request_.light.towards_light = glm::dvec3(0.5, 1, -0.3);
+  on_ranks(2, options, [&](TeamRenderer &renderer, std::uint32_t) {
+    EXPECT_THAT([&] { renderer.render(request_); },
+                testing::ThrowsMessage<Error>(testing::HasSubstr("a team draws without bounced")));
   });
 }
 
@@ -547,6 +558,30 @@ TEST_P(BrickTeamOnDevice, WithinAnError) {
   EXPECT_GT(most_pixels, 0);
   EXPECT_GT(most_error, 0);
   EXPECT_GT(num_uncertain, 5u);
+}
+
+/// Rays that are chosen for an error of the picture, as one renderer chooses them.
+TEST_P(BrickTeamOnDevice, WithinAnErrorOfThePicture) {
+  if (is_simulator(GetParam())) GTEST_SKIP() << "too many rays";
+  const RendererOptions options{.size = {256, 256}};
+  FrameRequest request = request_;
+  request.size = {24, 20, 8};
+  request.max_image_error = 0.12;
+  const auto draw = [&](Renderer &renderer) {
+    BoundedRenderer bounded(renderer, volume_.compressed, volume_.compressed.rate());
+    const ImageError error = bounded.render(request).detail.value().image.value();
+    return std::tuple(error.samples, error.mean, error.highest, bounded.shade().pixels);
+  };
+  ocl::Device device(GetParam());
+  DeviceRenderer renderer(device, volume_.compressed, options);
+  auto expected = draw(renderer);
+  EXPECT_GT(std::get<0>(expected), 1u);
+  EXPECT_LT(std::get<0>(expected), 8u);
+  on_ranks(2, options, [&](TeamRenderer &of_team, std::uint32_t rank) {
+    auto of_rank = expected;
+    if (rank != 0) std::get<3>(of_rank).clear();
+    EXPECT_EQ(draw(of_team), of_rank);
+  });
 }
 
 }  // namespace

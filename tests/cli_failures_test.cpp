@@ -118,7 +118,7 @@ class CliFailures : public testing::TestWithParam<Command> {
       std::mt19937 random(seed);
       fmt::print("seed {}, {} calls\n", seed, last);
       for (int i = 0; i < kTries; ++i)
-        tries.emplace_back(std::uniform_int_distribution(1l, last)(random), i % 2 == 0);
+        tries.emplace_back(std::uniform_int_distribution(first, last)(random), i % 2 == 0);
     }
     std::mutex expecting;
     parallel_for(tries.size(), 0, [&](std::uint64_t i, std::uint32_t) {

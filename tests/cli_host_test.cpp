@@ -61,7 +61,7 @@ TEST_F(CliHost, DrawsTheBitsOfADevice) {
   for (const std::string options :
        {"", "--exact --samples 2 --ambient 3", "--tolerance 0.5 --levels all --voxel-pixels 2",
         "--tolerance 0.5 --voxel-error 2 --normals cell --parallel", "--max-surface-error 2",
-        "--max-surface-error 2 --by sample", "--time-budget 60000"}) {
+        "--max-surface-error 2 --by sample", "--max-image-error 0.05", "--time-budget 60000"}) {
     const auto [on_host, text] =
         draw_in(kOnlyPocl, options + " --device host --depth " + path("host.npy"));
     EXPECT_THAT(text, HasSubstr(" threads; choose a device with --device or ISOWAVE_DEVICE\n"));
@@ -78,7 +78,7 @@ TEST_F(CliHost, DrawsVolumesThatAreTooSmallForLevels) {
   const std::string volume = " render generate:gyroid_5x20x21_uint8 -i 128 --size 40x30 ";
   for (const std::string options :
        {"--voxel-pixels 2", "--time-budget 60000", "--max-surface-error 1 --rate 8",
-        "--max-surface-error 1 --by sample --rate 8"}) {
+        "--max-surface-error 1 --by sample --rate 8", "--max-image-error 0.05 --rate 8"}) {
     const auto draw = [&](const std::string &device) {
       const auto result = run_in(kOnlyPocl, volume + options + device + " -o " + path("a.png"));
       EXPECT_EQ(result.status, 0) << options << device << "\n" << result.err;

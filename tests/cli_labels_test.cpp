@@ -77,6 +77,43 @@ TEST_F(CliLabels, PicturesAreThoseOfIndicators) {
   EXPECT_EQ(file("a.png"), file("b.png"));
 }
 
+/// A surface of two labels, each in its colour; the same by device, host, and scene file.
+TEST_F(CliLabels, SurfacesHaveColoursByLabel) {
+  const std::string seg = in("seg_25x24x23_uint16.raw") + " --labels 3+300 ";
+  render(seg + "-o " + in("plain.png"));
+  render(seg + "--color-by labels -o " + in("a.png") + " --save-scene " + in("s.json"));
+  EXPECT_NE(file("a.png"), file("plain.png"));
+  EXPECT_THAT(file("s.json"), HasSubstr("\"color_by_label\": true"));
+  render("--scene " + in("s.json") + " -o " + in("b.png"));
+  EXPECT_EQ(file("a.png"), file("b.png"));
+  render(seg + "--color-by labels --color-map labels -o " + in("b.png"));
+  EXPECT_EQ(file("a.png"), file("b.png"));
+  const test::ProgramResult on_host = test::run_isowave(
+      "render " + seg + "--color-by labels --size 48x36 --device host -o " + in("b.png"));
+  EXPECT_EQ(on_host.status, 0) << on_host.err;
+  EXPECT_EQ(file("a.png"), file("b.png"));
+  render(seg + "--color-by labels --color-map gray -o " + in("b.png"));
+  EXPECT_NE(file("a.png"), file("b.png"));
+  // An isosurface in the colours of a segmentation in another file.
+  const std::string both = in("both_25x24x23_uint8.raw") + " -i 0.5 --color-by ";
+  render(both + in("seg_25x24x23_uint16.raw") + ",labels -o " + in("c.png"));
+  render(both + "labels -o " + in("d.png"));
+  EXPECT_NE(file("c.png"), file("d.png"));
+}
+
+TEST_F(CliLabels, ColoursByWhatIsNoLabelAreRefused) {
+  const auto refuse_whole = [&](const std::string &options, const char *why) {
+    const test::ProgramResult result = test::run_isowave(
+        "render generate:sphere_9x9x9_float32 -i 1 --size 16x12 --device host -o " + in("a.png") +
+        " " + options);
+    EXPECT_NE(result.status, 0);
+    EXPECT_THAT(result.err, HasSubstr(why));
+  };
+  refuse_whole("--color-by labels", "the field's voxels are no labels");
+  refuse_whole("--color-by missing.raw,labels", "give x, y, z, NX,NY,NZ, volume or a file");
+  refuse("--labels 3 --color-by labels --annotate color-bar", "colours of labels have no order");
+}
+
 TEST_F(CliLabels, ScenesKeepThem) {
   render(in("seg_25x24x23_uint16.raw") + " --labels 3,red,0.4 --labels 300,,1,whole --clip y -o " +
          in("a.png") + " --save-scene " + in("s.json"));
@@ -110,8 +147,9 @@ TEST_F(CliLabels, WhatIsNoLabelIsRefused) {
 TEST_F(CliLabels, WhatLabelsAreDrawnWithoutIsRefused) {
   for (const char *option : {"-i 3", "--surface 3"})
     refuse("--labels 3 " + std::string(option), "--labels draws surfaces of labels alone");
-  for (const char *option : {"--voxel-pixels 1", "--voxel-error 1", "--max-surface-error 1",
-                             "--time-budget 9", "--slice z", "--reference", "--rate 8"})
+  for (const char *option :
+       {"--voxel-pixels 1", "--voxel-error 1", "--max-surface-error 1", "--max-image-error 0.1",
+        "--time-budget 9", "--slice z", "--reference", "--rate 8", "--light 1,0,0 --bounce 4"})
     refuse("--labels 3 " + std::string(option), "labels are drawn without it: leave it out");
   for (const char *option : {"--ambient 2", "--light 1,0,0 --shadow 1"})
     refuse("--labels 3,,0.5 " + std::string(option), "end at surfaces of opacity 1");

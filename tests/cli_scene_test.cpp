@@ -41,7 +41,7 @@ TEST_F(CliScene, EveryPictureIsDrawnAgainFromItsScene) {
         "--surface 10,,0.5 --clip-box ,,,,8, --no-caps",
         "-i 40 --slice z,20 --slice 1,1,0 --slice-opacity 0.5 --slice-map magma --clip x",
         "--surface 10,skin,,whole --slice y --slice-range 0,99 --clip 0,0,1",
-        "-i 40 --light 1,2,0.5 --shadow 2 --light-angle 9",
+        "-i 40 --light 1,2,0.5 --shadow 2 --light-angle 9 --bounce 3",
         "-i 40 --color-by 1,1,0,5,60 --color-map magma --samples 2"}) {
     render(kFuel + options + " -o " + in("a.png") + " --save-scene " + in("s.json"));
     const std::string samples = options.find("--samples") == options.npos ? "" : " --samples 2";

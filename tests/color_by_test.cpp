@@ -139,7 +139,7 @@ TEST(ColorBy, RefusesWhatCannotBeShown) {
   }
   EXPECT_THAT([] { color_map("jet"); },
               ThrowsMessage<Error>("there is no colour map 'jet': viridis, magma, cividis, "
-                                   "coolwarm, gray"));
+                                   "coolwarm, gray, labels"));
 }
 
 TEST(ColorMaps, EndWhereTheirAuthorsSay) {

@@ -66,8 +66,10 @@ class CompileOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
            {0.1f, 0.4f}) {  // the second has the cached blocks classified anew
         renderer.render({.camera = cameras_[0],
                          .isovalue = isovalue,
+                         .light = {.towards_light = glm::dvec3(0, 0, 1)},
                          .voxel_pixels = pixels,
-                         .ambient_rays = options.with_given_rays ? 2u : 0u});
+                         .ambient_rays = options.with_given_rays || options.with_bounce ? 2u : 0u,
+                         .bounce_rays = options.with_bounce ? 2u : 0u});
         EXPECT_EQ(renderer.shade().pixels.size(), 3 * options.size.num_pixels());
       }
     }
@@ -77,7 +79,7 @@ class CompileOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
       renderer.enlarge_kept({cameras_[0], 0.1f});
       renderer.fill_from_kept();
     }
-    if (options.with_given_rays) {
+    if (options.with_given_rays || options.with_bounce) {
       renderer.cast_rays(std::vector<WorldRay>(1, {glm::dvec3(-1), glm::dvec3(1)}), 0.1f,
                          Normals::kSmooth);
     }
@@ -98,7 +100,7 @@ TEST_P(CompileOnDevice, NothingIsLeftForFrames) {
   expect_all_compiled({.size = kSize, .with_levels = true});
   expect_all_compiled({.size = kSize, .stream = StreamPlace::kHost, .with_levels = true});
   expect_all_compiled({.size = kSize, .with_kept_picture = true});
-  expect_all_compiled({.size = kSize, .with_levels = true, .with_given_rays = true});
+  expect_all_compiled({.size = kSize, .with_levels = true, .with_bounce = true});
   expect_all_compiled({.size = kSize, .pipeline = blocks_pipeline(), .with_given_rays = true});
 }
 

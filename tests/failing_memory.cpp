@@ -10,6 +10,8 @@
 // memory: TBB, zfp, libpng, zlib, fmt. They may come through the C and the C++ library. PoCL and
 // LLVM abort without memory, whatever the program does. So no request counts that has any other
 // library on its stack: LLVM also calls templates of std::string that the program has instantiated.
+// Requests within dlopen(), by which TBB looks for libraries that may be missing, do not count
+// either: glibc (2.36) reads a null pointer without memory for their error.
 
 #include <dlfcn.h>
 #include <link.h>
@@ -23,6 +25,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <string_view>
+#include <utility>
 
 extern "C" {
 void *__libc_malloc(std::size_t);
@@ -123,6 +126,14 @@ void *mmap(void *address, std::size_t size, int protection, int flags, int file,
   static const auto real = reinterpret_cast<decltype(&mmap)>(dlsym(RTLD_NEXT, "mmap"));
   return fails(__builtin_return_address(0)) ? MAP_FAILED
                                             : real(address, size, protection, flags, file, offset);
+}
+
+void *dlopen(const char *file, int mode) {
+  static const auto real = reinterpret_cast<decltype(&dlopen)>(dlsym(RTLD_NEXT, "dlopen"));
+  const bool was_in_here = std::exchange(in_here, true);
+  void *const handle = real(file, mode);
+  in_here = was_in_here;
+  return handle;
 }
 
 }  // extern "C"

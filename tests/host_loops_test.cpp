@@ -43,7 +43,8 @@ TEST(HostLoops, AllGiveTheSameBits) {
   const std::vector<FrameParams> frames = {frame};
   const std::vector<VolumeInfo> infos = {volume.info()};
   const std::vector<std::vector<float>> voxels = {volume.voxels};
-  const std::vector<uchar> open = count_open(frames, infos, voxels, expected, {.num_ambient = 3});
+  const std::vector<uchar> open =
+      open_of(frames, infos, voxels, expected, {.num_ambient = 3}).counts;
   std::vector<HitRecord> smooth = expected;
   smooth_gradients(frame, volume.voxels, smooth);
   for (const HostLoops &loops : all_host_loops()) {
@@ -57,10 +58,11 @@ TEST(HostLoops, AllGiveTheSameBits) {
       }
     }
     std::vector<uchar> counts(64 * 48);
-    loops.ambient({frame, blocks.field()}, {0, 0, 64, 48}, ambient, hits.data(), counts.data());
+    loops.ambient({frame, blocks.field()}, {0, 0, 64, 48}, ambient, hits.data(), counts.data(),
+                  nullptr);
     EXPECT_EQ(counts, open);
     std::vector<std::uint8_t> row(3 * 64);
-    loops.shade(frame, shading, 1, 23, hits.data(), nullptr, 0, 0, nullptr, row.data());
+    loops.shade(frame, shading, 1, 23, hits.data(), {}, nullptr, row.data());
     EXPECT_EQ(std::memcmp(row.data(), picture.pixels.data() + 23 * row.size(), row.size()), 0);
     std::size_t num_compared = 0;
     for (std::uint32_t id = 0; id < volume.compressed.block_count(); ++id) {

@@ -56,11 +56,6 @@ FrameRequest lit_request(const VolumeInfo &info, const std::vector<SurfaceStyle>
   return request;
 }
 
-FrameRequest without_light_rays(FrameRequest request) {
-  request.ambient_rays = request.shadow_rays = 0;
-  return request;
-}
-
 /// Pictures with and without light rays are those of the twin, and differ.
 void expect_lit_as_the_twin(Renderer &renderer, TwinRenderer &twin, const FrameRequest &request) {
   const Appearance &appearance = request.light;

@@ -96,11 +96,12 @@ class MarchPacketsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
   }
 
   /// Rays alone that share a work-group out look into blocks behind the one that decides, too,
-  /// where they are few. Else the same blocks are read in a pass.
-  static void expect_stamps(const RaysWorld &got, const RaysWorld &expected) {
+  /// where they are few (lanes_per_ray()). Else the same blocks are read in a pass.
+  void expect_stamps(const RaysWorld &got, const RaysWorld &expected) const {
     const std::map<uint, uint> of_packets = stamps(got), of_rays = stamps(expected);
     const PassCounts counts = expected.counts();
-    const bool are_few = counts.active_count < 512;
+    const ocl::Range range = ocl::Range::strided(expected.rays.num_rays, ocl::kGroupSize, device_);
+    const bool are_few = 2 * counts.active_count <= range.num_groups * range.group_size;
     ASSERT_EQ(of_packets.size(), of_rays.size());
     for (const auto &[block, stamp] : of_rays) {
       ASSERT_LE(of_packets.at(block), stamp) << "block " << block;

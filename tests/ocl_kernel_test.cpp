@@ -43,8 +43,9 @@ static_assert(kTakes<kernels::store_pair_hit, PairHit, Out<PairHit>>);
 static_assert(kTakes<kernels::prefix_tile_offsets, uint, Out<uint>, Out<uint>>);  // attributes
 static_assert(kTakes<kernels::macrocell_coarse_ranges, FrameParams, uint, In<ushort>,
                      Out<ushort>>);  // const FrameParams
-static_assert(kTakes<kernels::shade, FrameParams, ShadeParams, In<uint>, uint, In<HitRecord>,
-                     In<uchar>, uint, uint, In<float>, uint, Out<std::byte>>);             // void
+static_assert(
+    kTakes<kernels::shade, FrameParams, ShadeParams, In<uint>, uint, In<HitRecord>, In<uchar>, uint,
+           uint, In<float>, uint, In<float>, uint, Out<std::byte>>);                       // void
 static_assert(kTakes<kernels::compact_count, In<uint>, In<PassCounts>, uint, Out<uint>>);  // words
 static_assert(kTakes<kernels::raster_part, FrameParams, RasterView, uint, uint, In<BlockVertex>,
                      Out<uint>, Out<uint>, uint, Out<uint>>);  // volatile global uint *

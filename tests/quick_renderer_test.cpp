@@ -85,6 +85,27 @@ TEST_P(QuickRendererOnDevice, AFrameAtWorkIsBegunAnewByTheDevice) {
   EXPECT_EQ(frame.depth, renderer.render(wanted).depth);
 }
 
+/// The host would choose among levels of detail that the device cannot draw.
+TEST_P(QuickRendererOnDevice, ErrorsOfPicturesAreKeptAlike) {
+  FrameRequest wanted = request();
+  wanted.size.samples = 4;
+  wanted.max_image_error = 0.04;
+  for (const bool with_levels : {true, false}) {
+    const RendererOptions options{.largest = {128, 96, 4}, .with_levels = with_levels};
+    const Frame expected = Renderer(device_, volume_, options).render(wanted);
+    EXPECT_EQ(expected.detail->voxel_pixels > 0, with_levels);
+    std::unique_lock busy = busy_device();
+    Renderer renderer = make(options);
+    EXPECT_EQ(renderer.ready_for(wanted), with_levels);
+    if (with_levels) {
+      EXPECT_EQ(renderer.render(wanted).picture, expected.picture);
+      EXPECT_FALSE(renderer.ready());
+    }
+    busy.unlock();
+    EXPECT_EQ(renderer.render(wanted).picture, expected.picture);
+  }
+}
+
 TEST_P(QuickRendererOnDevice, TheHostDrawsAllThatTheDeviceCan) {
   FrameRequest detail = request(), bounds = request();
   detail.voxel_pixels = 2;

@@ -388,6 +388,11 @@ TEST(RaySample, SeriesHaveOneDetail) {
     EXPECT_EQ(other.render(seen_from(far, request)).detail->detail, first.detail);
     request.isovalue = 0.1f;
     EXPECT_GT(bounded.render(request).detail->total_ms, 0) << "another isovalue";
+    if (by == Evidence::kSample) {
+      FrameRequest clipped = request;
+      clipped.clip.planes = {{{1, 0, 0}, near.at.x}};
+      EXPECT_GT(bounded.render(clipped).detail->total_ms, 0) << "another part";
+    }
     request.series = {near};
     request.isovalue = 0.3f;
     EXPECT_EQ(bounded.render(request).detail->detail, of_near);

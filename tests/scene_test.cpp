@@ -43,16 +43,19 @@ Scene full_scene() {
   scene.appearance.transparent = true;
   scene.appearance.light_direction = Vector3{1, 0.5, -2};
   scene.appearance.shadow_rays = 16;
+  scene.appearance.bounce_rays = 24;
   scene.appearance.light_angle = 1.5;
   scene.appearance.color_map = "magma";
   scene.appearance.color_axis = {1, 0, 0};
   scene.appearance.color_caps_alone = true;
   scene.appearance.color_by_field = true;
+  scene.appearance.color_by_label = true;
   scene.appearance.color_low = -1;
   scene.appearance.color_high = 1e30;
   scene.appearance.slice_map = "coolwarm";
   scene.appearance.slice_low = -3;
   scene.appearance.slice_high = 0.5;
+  scene.annotations = Annotations{true, true, true, true, "µm", "a head, \"cut\""};
   return scene;
 }
 
@@ -84,6 +87,28 @@ TEST(Scene, TextsKeepEveryField) {
       EXPECT_TRUE(text.contains(name)) << name;
     }
   });
+  for_each_annotations_field(*without_defaults.annotations, [&](const char *name, const auto &) {
+    EXPECT_TRUE(text["annotations"].contains(name)) << name;
+  });
+}
+
+TEST(Scene, AnnotationsAreLeftOutUnlessTheyAreTrue) {
+  const auto read = [](const std::string &annotations) {
+    return parse_scene(R"({"isowave_scene": 1, "surfaces": [{"isovalue": 1}], "annotations": )" +
+                       annotations + "}");
+  };
+  EXPECT_FALSE(one_surface().annotations);
+  for (const char *text : {"{}", R"({"axes": false, "units": "mm"})"}) {
+    const Scene scene = read(text);
+    ASSERT_TRUE(scene.annotations);
+    const Annotations &found = *scene.annotations;
+    EXPECT_FALSE(found.scale_bar || found.axes || found.color_bar || found.caption);
+    EXPECT_EQ(scene_text(parse_scene(scene_text(scene))), scene_text(scene)) << "and is kept";
+  }
+  const Annotations found = *read(R"({"axes": true, "units": "Å", "title": "a"})").annotations;
+  EXPECT_TRUE(found.axes && !found.caption);
+  EXPECT_EQ(found.units + found.title, "Åa");
+  EXPECT_TRUE(read(R"({"units": "µµµµµµµµµµµµµµµµ"})").annotations) << "16 letters";
 }
 
 TEST(Scene, TextsKeepTablesOfColours) {
@@ -168,10 +193,22 @@ TEST(Scene, BadTextsAreOneLineThatSaysWhere) {
       {with(surface + R"(, "shadow_rays": 1.5)"), "shadow_rays must be a whole number"},
       {with(surface + R"(, "shadow_rays": 1)"), "shadows need a light"},
       {with(surface + R"(, "light_direction": [0, 1, 0], "shadow_rays": 256)"), "256 shadow rays"},
+      {with(surface + R"(, "bounce_rays": 16)"), "bounced light needs a light"},
+      {with(surface + R"(, "light_direction": [0, 1, 0], "bounce_rays": 256)"), "256 bounce rays"},
       {with(surface + R"(, "light_direction": [0, 1, 0], "shadow_rays": 9, "light_angle": 50)"),
        "50"},
       {with(surface + R"(, "color_map": "jet")"), "jet"},
       {with(surface + R"(, "color_map": "gray", "color_axis": [0, 0, 0])"), "axis"},
+      {with(surface + R"(, "annotations": true)"), "annotations must be an object"},
+      {with(surface + R"(, "annotations": null)"), "annotations must be an object"},
+      {with(surface + R"(, "annotations": {"axis": true})"), "annotations has no \"axis\""},
+      {with(surface + R"(, "annotations": {"axes": 1})"), "annotations.axes must be true or false"},
+      {with(surface + R"(, "annotations": {"units": 1})"), "annotations.units must be a text"},
+      {with(surface + R"(, "annotations": {"units": "12345678901234567"})"),
+       "annotations.units: 17 letters are too many: give at most 16"},
+      {with(surface + R"(, "annotations": {"title": []})"), "annotations.title must be a text"},
+      {with(surface + R"(, "annotations": {"color_bar": true})"),
+       "annotations.color_bar: there is no colour map, and no slice"},
   };
   for (const auto &[text, why] : texts) {
     const std::string error = error_of([&] { parse_scene(text); });

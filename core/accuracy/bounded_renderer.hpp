@@ -1,13 +1,19 @@
 #pragma once
 // Frames within an error: chooses how coarse a frame may be drawn, and draws it so.
 
+#include <optional>
+#include <utility>
+#include <vector>
+
 #include "core/accuracy/choose_detail.hpp"
+#include "core/accuracy/image_error.hpp"
 #include "core/frame/renderer.hpp"
 
 namespace isowave::core {
 
 /// Draws frames with a largest surface error (choose_detail()): by proof if the other renderer has
-/// bounds, by sample in any case. Other requests are handed on.
+/// bounds, by sample in any case; and with a largest image error (choose_for_image()). Other
+/// requests are handed on.
 class BoundedRenderer : public RendererAround {
  public:
   /// volume  that this process's renderer was made for; must outlive this
@@ -21,16 +27,16 @@ class BoundedRenderer : public RendererAround {
     Abilities abilities = inner().abilities();
     abilities.surface_error = abilities.bounds;
     abilities.sampled_error = true;
+    abilities.image_error = true;
     return abilities;
   }
 
   /// Returns  with FrameStats::detail, if the request has a largest error
   FrameStats render(const FrameRequest &request) override {
-    if (!request.max_surface_error) return inner().render(request);
+    if (!request.max_surface_error && !request.max_image_error) return inner().render(request);
     check(request, abilities());
-    FrameRequest chosen = without_error(request);
-    const DetailChoice choice = choice_for(request, chosen);
-    FrameStats stats = inner().render(with_detail(std::move(chosen), choice.detail));
+    const DetailChoice choice = choice_for(request);
+    FrameStats stats = inner().render(as_chosen(request, choice, abilities().largest));
     stats.detail = choice;
     return stats;
   }
@@ -40,26 +46,42 @@ class BoundedRenderer : public RendererAround {
   struct SeriesKey {
     std::vector<Camera> series;
     float isovalue;
+    Clip clip;
     ImageSize size;
-    double error;
+    std::optional<double> surface_error, image_error;
     Evidence by;
+    std::optional<std::pair<Appearance, Normals>> look;  ///< with an image error
     friend bool operator==(const SeriesKey &, const SeriesKey &) = default;
   };
 
-  /// chosen: the request without an error
-  DetailChoice choice_for(const FrameRequest &request, const FrameRequest &chosen) {
-    const double error = *request.max_surface_error;
-    const auto choose = [&] {
-      return choose_detail(inner(), volume_, rate_, chosen, error, request.by, request.series);
-    };
-    if (request.series.empty()) return choose();
-    const SeriesKey key{request.series, request.isovalue, size_of(request, abilities()), error,
-                        request.by};
+  static std::optional<std::pair<Appearance, Normals>> look_of(const FrameRequest &request) {
+    if (!request.max_image_error) return {};
+    return std::pair(request.light, request.normals);
+  }
+
+  DetailChoice choose(const FrameRequest &request) {
+    const FrameRequest plain = without_error(request);
+    if (request.max_image_error)
+      return choose_for_image(inner(), plain, *request.max_image_error, request.series);
+    return choose_detail(inner(), volume_, rate_, plain, *request.max_surface_error, request.by,
+                         request.series);
+  }
+
+  DetailChoice choice_for(const FrameRequest &request) {
+    if (request.series.empty()) return choose(request);
+    const SeriesKey key{request.series,
+                        request.isovalue,
+                        request.clip,
+                        size_of(request, abilities()),
+                        request.max_surface_error,
+                        request.max_image_error,
+                        request.by,
+                        look_of(request)};
     if (key == of_series_) {
       choice_.total_ms = 0;
     } else {
       of_series_.reset();
-      choice_ = choose();
+      choice_ = choose(request);
       of_series_ = key;
     }
     return choice_;

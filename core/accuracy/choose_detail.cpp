@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/accuracy/candidates.hpp"
 #include "core/accuracy/ray_sample.hpp"
 #include "core/base/error.hpp"
 #include "core/base/ms_since.hpp"
@@ -37,42 +38,6 @@ std::vector<double> voxel_errors(const CompressedVolume &volume, double error) {
     if (plane_error(volume.precision, voxel_error) != 0) errors.push_back(voxel_error);
   }
   return errors;
-}
-
-/// Blocks that frames decode for some hits, in units that do not matter: with levels of detail, and
-/// of the finest level alone.
-struct Blocks {
-  double with_levels = 0, finest = 0;
-
-  double share() const { return finest == 0 ? 1.0 : with_levels / finest; }
-};
-
-/// Adds a frame's: a pixel covers blocks by the square of its distance, and of each level a quarter
-/// as many.
-void add_blocks(std::span<const float> depth, std::span<const FrameParams> frames, Blocks &sum) {
-  for (const float t : depth) {
-    if (std::isinf(t)) continue;
-    int level = 0;
-    for (std::size_t i = 1; i < frames.size(); ++i) {
-      if (draws(frames[i]) && frames[i].band.begin_t * frames[i].view.t_scale <= t)
-        level = static_cast<int>(i);
-    }
-    const double blocks = double{t} * double{t};
-    sum.finest += blocks;
-    sum.with_levels += std::ldexp(blocks, -2 * level);
-  }
-}
-
-/// Most views of a series that are looked at.
-constexpr std::size_t kSeriesViews = 4;
-/// The views that detail is chosen for, spread evenly over a series.
-std::vector<Camera> views_of(const FrameRequest &request, std::span<const Camera> series) {
-  if (series.empty()) return {request.camera};
-  std::vector<Camera> views;
-  const std::size_t num_views = std::min(series.size(), kSeriesViews);
-  for (std::size_t i = 0; i < num_views; ++i)
-    views.push_back(series[i * series.size() / num_views]);
-  return views;
 }
 
 /// An error of at least so much can be kept in any volume of these values: 2^-24 of the next power
@@ -123,14 +88,13 @@ class Judge {
         double max_surface_error, Evidence by, std::span<const Camera> series)
       : renderer_(renderer),
         volume_(volume),
-        request_(request),
-        views_(views_of(request, series)),
+        request_(without_light_rays(request)),
+        views_(views_of(request.camera, series)),
         levels_(renderer.levels()),
         size_(sample_of(size_of(request, renderer.abilities()))),
         max_surface_error_(max_surface_error),
         by_(by) {
     request_.normals = Normals::kCell;
-    request_.ambient_rays = request_.shadow_rays = 0;
     request_.size = size_;
     request_.on_pass = {};
     const View view = make_view(levels_.front(), request.camera, size_);
@@ -149,12 +113,13 @@ class Judge {
   double best() const { return best_; }  ///< share of the pixels, at full detail
   double median() const { return median_; }
   /// Blocks with levels so coarse, as the sample's hits tell.
-  Blocks blocks(double voxel_pixels) const {
-    Blocks blocks;
+  HitBlocks blocks(double voxel_pixels) const {
+    HitBlocks blocks;
     for (std::size_t i = 0; i < views_.size(); ++i) {
-      add_blocks(finest_depth_[i],
-                 make_level_frames(levels_, views_[i], size_, request_.isovalue, voxel_pixels),
-                 blocks);
+      const std::vector<FrameParams> frames =
+          make_level_frames(levels_, views_[i], size_, request_.isovalue, voxel_pixels);
+      add_hit_blocks(finest_depth_[i], levels_.front(), frames, views_[i], size_.height, INFINITY,
+                     blocks);
     }
     return blocks;
   }

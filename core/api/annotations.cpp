@@ -155,6 +155,10 @@ AnnotationGroup orientation_axes(const Sheet &sheet, const core::Camera &camera)
   return group;
 }
 
+bool has_map(const Appearance &appearance) {
+  return !appearance.color_map.empty() || !appearance.color_table.empty();
+}
+
 std::string bar_title(const Appearance &appearance, const std::string &units) {
   if (appearance.color_by_field) return "value";
   const Vector3 &axis = appearance.color_axis;
@@ -184,19 +188,28 @@ void add_bar_colors(AnnotationGroup &group, const core::ColorTable &colors, doub
   }
 }
 
-AnnotationGroup color_bar(const Sheet &sheet, const Annotations &wanted,
-                          const Appearance &appearance, const std::array<double, 2> &range) {
+/// A colour bar.
+struct Bar {
+  core::ColorTable colors{};
+  std::array<double, 2> range{};  ///< values of the first and the last colour
+  std::string title{};
+};
+
+/// Bars stand at the picture's right edge, one above the other.
+///
+/// begin, end  parts of the picture's height
+AnnotationGroup color_bar(const Sheet &sheet, const Bar &bar, double begin, double end) {
+  const std::array<double, 2> &range = bar.range;
   const double font = sheet.font(), line = sheet.line() / 2;
   const core::Ticks ticks = core::ticks_between(range[0], range[1]);
   double labels = 0;
   for (const std::string &label : ticks.labels) labels = std::max(labels, sheet.usual_width(label));
   const double right = std::floor(sheet.width() - sheet.margin() - labels - 0.6 * font),
-               left = right - std::round(font), top = std::round(0.28 * sheet.height()),
-               bottom = std::round(0.7 * sheet.height());
+               left = right - std::round(font), top = std::round(begin * sheet.height()),
+               bottom = std::round(end * sheet.height());
   const Color ink = sheet.ink_at((top + bottom) / 2);
   AnnotationGroup group = sheet.group_at((top + bottom) / 2);
-  add_bar_colors(group, color_table_of(appearance.color_map, appearance.color_table), left, right,
-                 top, bottom);
+  add_bar_colors(group, bar.colors, left, right, top, bottom);
   group.strokes.push_back(
       {{{left, top}, {right, top}, {right, bottom}, {left, bottom}, {left, top}}, line, ink});
   for (std::size_t i = 0; i < ticks.values.size(); ++i) {
@@ -207,9 +220,30 @@ AnnotationGroup color_bar(const Sheet &sheet, const Annotations &wanted,
     group.texts.push_back(
         sheet.text(ticks.labels[i], {right + 0.6 * font, y + kHalfCapital * font}, 0, ink));
   }
-  group.texts.push_back(sheet.text(bar_title(appearance, wanted.units),
-                                   {sheet.width() - sheet.margin(), top - 0.8 * font}, 1, ink));
+  group.texts.push_back(
+      sheet.text(bar.title, {sheet.width() - sheet.margin(), top - 0.8 * font}, 1, ink));
   return group;
+}
+
+/// Adds the bars of surfaces and slices, as far as they have ranges.
+void add_color_bars(const Sheet &sheet, const Annotations &wanted, const Appearance &appearance,
+                    const std::optional<std::array<double, 2>> &color_range,
+                    const std::optional<std::array<double, 2>> &slice_range,
+                    std::vector<AnnotationGroup> &groups) {
+  std::vector<Bar> bars;
+  if (color_range && has_map(appearance)) {
+    bars.push_back({color_table_of(appearance.color_map, appearance.color_table), *color_range,
+                    bar_title(appearance, wanted.units)});
+  }
+  if (slice_range)
+    bars.push_back(
+        {color_table_of(appearance.slice_map, appearance.slice_table), *slice_range, "slices"});
+  if (bars.size() == 1) {
+    groups.push_back(color_bar(sheet, bars[0], 0.28, 0.7));
+  } else if (bars.size() == 2) {
+    groups.push_back(color_bar(sheet, bars[0], 0.18, 0.42));
+    groups.push_back(color_bar(sheet, bars[1], 0.57, 0.81));
+  }
 }
 
 /// A title that is too long keeps its two ends.
@@ -234,8 +268,7 @@ AnnotationGroup caption(const Sheet &sheet, const Annotations &wanted,
     y += kLineHeight * font;
   }
   const Appearance &appearance = request.appearance;
-  const bool has_map = !appearance.color_map.empty() || !appearance.color_table.empty();
-  const bool has_own_colors = !has_map || appearance.color_caps_alone;
+  const bool has_own_colors = !has_map(appearance) || appearance.color_caps_alone;
   std::vector<Surface> surfaces = request.surfaces;
   if (surfaces.empty()) surfaces = {{request.isovalue, appearance.surface, 1}};
   for (const Surface &surface : surfaces) {
@@ -263,13 +296,14 @@ AnnotationGroup caption(const Sheet &sheet, const Annotations &wanted,
 }
 
 std::vector<AnnotationGroup> layout(const Annotations &wanted, const FrameRequest &request,
-                                    const std::optional<std::array<double, 2>> &color_range) {
+                                    const std::optional<std::array<double, 2>> &color_range,
+                                    const std::optional<std::array<double, 2>> &slice_range) {
   const ImageSize &size = request.size;
   if (size.width < kLeastWidth || size.height < kLeastHeight)
     throw core::Error("{} x {} pixels are too few for annotations: draw at least {} x {}",
                       size.width, size.height, kLeastWidth, kLeastHeight);
   const Appearance &appearance = request.appearance;
-  if (wanted.color_bar && appearance.color_map.empty() && appearance.color_table.empty())
+  if (wanted.color_bar && !has_map(appearance) && request.slices.empty())
     throw core::Error(
         "a colour bar needs a colour map, and the surfaces have colours of their own");
   const Sheet sheet(request);
@@ -278,8 +312,7 @@ std::vector<AnnotationGroup> layout(const Annotations &wanted, const FrameReques
   std::vector<AnnotationGroup> groups;
   if (wanted.scale_bar) groups.push_back(scale_bar(sheet, wanted, camera));
   if (wanted.axes) groups.push_back(orientation_axes(sheet, camera));
-  if (wanted.color_bar && color_range)
-    groups.push_back(color_bar(sheet, wanted, appearance, *color_range));
+  if (wanted.color_bar) add_color_bars(sheet, wanted, appearance, color_range, slice_range, groups);
   if (wanted.caption) groups.push_back(caption(sheet, wanted, request));
   for (AnnotationGroup &group : groups) sheet.finish(group);
   return groups;
@@ -289,8 +322,10 @@ std::vector<AnnotationGroup> layout(const Annotations &wanted, const FrameReques
 
 std::vector<AnnotationGroup> annotation_layout(
     const Annotations &wanted, const FrameRequest &request,
-    const std::optional<std::array<double, 2>> &color_range) {
-  return core::guarded("placing annotations", [&] { return layout(wanted, request, color_range); });
+    const std::optional<std::array<double, 2>> &color_range,
+    const std::optional<std::array<double, 2>> &slice_range) {
+  return core::guarded("placing annotations",
+                       [&] { return layout(wanted, request, color_range, slice_range); });
 }
 
 }  // namespace isowave

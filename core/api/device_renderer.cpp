@@ -20,6 +20,7 @@ core::RendererOptions core_options(const RendererOptions &options, std::uint32_t
   result.with_bounds = options.with_bounds;
   result.with_kept_picture = options.with_time_budget;
   result.with_given_rays = options.with_rays;
+  result.with_bounce = options.with_bounce;
   result.max_surfaces = options.with_surfaces;
   result.with_labels = options.with_labels;
   if (options.field) result.field = &options.field->implementation().volume;
@@ -34,7 +35,7 @@ core::Abilities abilities_on_device(const RendererOptions &options, const Volume
   core::Abilities abilities =
       core::DeviceRenderer::abilities_of(core_options(options, volume.num_levels()));
   abilities.surface_error = options.with_bounds;
-  abilities.sampled_error = true;
+  abilities.sampled_error = abilities.image_error = true;
   abilities.time_budget = options.with_time_budget;
   return abilities;
 }

@@ -143,6 +143,8 @@ core::Appearance core_appearance(const Appearance &appearance, const core::Volum
   if (appearance.background_top) result.background_top = to_glm(*appearance.background_top);
   if (appearance.light_direction) result.towards_light = to_glm(*appearance.light_direction);
   core::check_light(result.towards_light);
+  if (appearance.color_by_label && !appearance.color_by_field)
+    throw core::Error("colours by label are those of a field: set color_by_field, too");
   if (appearance.color_map.empty() && appearance.color_table.empty()) {
     if (appearance.color_by_field)
       throw core::Error("colours by a field need a colour map: give color_map or color_table");
@@ -152,7 +154,8 @@ core::Appearance core_appearance(const Appearance &appearance, const core::Volum
     throw core::Error("colours are those of color_map or of color_table: leave out either");
   const core::ColorTable colors = color_table_of(appearance.color_map, appearance.color_table);
   if (appearance.color_by_field) {
-    result.color_by_field = {appearance.color_low, appearance.color_high, colors};
+    result.color_by_field = {appearance.color_low, appearance.color_high, colors,
+                             appearance.color_by_label};
     core::check_color_by_field(*result.color_by_field);
     return result;
   }
@@ -213,13 +216,16 @@ core::FrameRequest core_request(const FrameRequest &request, const core::Compres
   const bool has_colors = request.want_picture || request.on_pass;
   result.field_values = request.want_field || (request.appearance.color_by_field && has_colors);
   result.field_on_caps = request.appearance.color_caps_alone;
+  result.field_labels = request.appearance.color_by_label;
   if (has_colors) {
     result.ambient_rays = request.ambient_rays;
     result.shadow_rays = request.appearance.shadow_rays;
+    result.bounce_rays = request.appearance.bounce_rays;
   }
   result.light_angle = request.appearance.light_angle;
   result.max_surface_error = request.max_surface_error;
   result.by = static_cast<core::Evidence>(request.by);
+  result.max_image_error = request.max_image_error;
   std::ranges::transform(request.series, std::back_inserter(result.series), core_camera);
   result.time_budget_ms = request.time_budget_ms;
   return result;
@@ -359,12 +365,15 @@ DetailChoice public_choice(const core::DetailChoice &choice) {
     result.sample = {choice.sample->num_rays, choice.sample->num_hits, choice.sample->num_within,
                      choice.sample->lowest};
   }
+  if (const auto &image = choice.image)
+    result.image = {image->samples, image->num_tiles, image->mean, image->highest};
   return result;
 }
 
 void describe_frame(const FrameRequest &request, const core::FrameStats &stats, Frame &frame) {
   frame.size = request.size;
-  const core::ImageSize size = core_size(request.size);
+  if (stats.detail && stats.detail->image) frame.size.samples = stats.detail->image->samples;
+  const core::ImageSize size = core_size(frame.size);
   frame.rows = size.ray_rows();
   frame.columns = size.ray_columns();
   frame.statistics = public_statistics(stats, size.num_rays());

@@ -22,10 +22,13 @@ std::unique_ptr<core::Renderer> make_on_host(const core::CompressedVolume &volum
                      {.with_time_budget = true}, volume, volume.rate());
 }
 
-core::Abilities abilities_on_host(const core::CompressedVolume &volume, bool has_field) {
+core::Abilities abilities_on_host(const core::CompressedVolume &volume,
+                                  const core::CompressedVolume *field) {
   core::Abilities abilities = core::HostRenderer::abilities_of(volume);
-  abilities.field = has_field;
-  abilities.surface_error = abilities.sampled_error = abilities.time_budget = true;
+  abilities.field = field != nullptr;
+  abilities.field_labels = field != nullptr && core::are_labels(*field);
+  abilities.surface_error = abilities.sampled_error = abilities.image_error = true;
+  abilities.time_budget = true;
   return abilities;
 }
 

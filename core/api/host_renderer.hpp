@@ -13,6 +13,7 @@ namespace isowave {
 std::unique_ptr<core::Renderer> make_on_host(const core::CompressedVolume &volume,
                                              const HostRendererOptions &options);
 /// Abilities of the renderer that make_on_host() makes.
-core::Abilities abilities_on_host(const core::CompressedVolume &volume, bool has_field);
+core::Abilities abilities_on_host(const core::CompressedVolume &volume,
+                                  const core::CompressedVolume *field);
 
 }  // namespace isowave

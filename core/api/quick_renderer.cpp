@@ -42,13 +42,17 @@ Renderer make_quick_renderer(std::shared_ptr<Device> device, std::shared_ptr<con
     core::make_plan(
         on.device, compressed,
         core::checked(core_options(options, volume->num_levels()), compressed, on.device));
+    core::Abilities meanwhile = abilities_on_host(
+        compressed, options.field ? &options.field->implementation().volume : nullptr);
+    // The host would choose among levels that the device cannot draw.
+    meanwhile.image_error = options.with_levels || volume->num_levels() == 1;
     const auto turns = std::make_shared<Turns>();  // one frame at a time
     auto renderer = std::make_unique<core::SoonRenderer>(core::SoonParts{
         .abilities = abilities_on_device(options, *volume),
         .make = [&to = *device, &of = *volume,
                  options](const std::stop_token &stop) { return make_soon(to, of, options, stop); },
         .before_use = [&on, &turn = *turns] { turn.take(on.mutex); },
-        .meanwhile_abilities = abilities_on_host(compressed, options.field != nullptr),
+        .meanwhile_abilities = meanwhile,
         .make_meanwhile =
             [&compressed, host_options, field = options.field] {
               HostRendererOptions with_field = host_options;

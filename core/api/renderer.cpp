@@ -21,6 +21,12 @@ namespace {
 
 using core::guarded;
 
+/// An appearance for the renderer's last frame: in layers, colours by a field are blended already.
+core::Appearance of_last_frame(core::Appearance appearance, const core::Renderer &renderer) {
+  if (!renderer.has_field_values()) appearance.color_by_field.reset();
+  return appearance;
+}
+
 /// The frame at work, for on_pass.
 class ProgressOf : public ProgressInTurns {
  public:
@@ -33,7 +39,8 @@ class ProgressOf : public ProgressInTurns {
     return {size.width, size.height, size.samples};
   }
   Array<std::uint8_t> draw_picture() const override {
-    return public_array(renderer_.fetch({.picture = true}, appearance_).picture);
+    const core::Appearance appearance = of_last_frame(appearance_, renderer_);
+    return public_array(renderer_.fetch({.picture = true}, appearance).picture);
   }
 
   core::Renderer &renderer_;
@@ -91,7 +98,7 @@ Frame Renderer::Implementation::draw(const FrameRequest &request) {
   note_memory();
   wanted.on_pass = {};
   if (stats.detail) {
-    wanted = with_detail(without_error(std::move(wanted)), stats.detail->detail);
+    wanted = as_chosen(std::move(wanted), *stats.detail, renderer_->abilities().largest);
     if (team.rank() == 0) frame.detail = public_choice(*stats.detail);
   }
   fetch(request, frame);
@@ -111,7 +118,8 @@ namespace {
 std::optional<std::array<double, 2>> range_of_colors(
     const core::Appearance &appearance, const std::optional<std::array<float, 2>> &field_range) {
   if (appearance.color_by) return std::array{appearance.color_by->low, appearance.color_by->high};
-  if (!appearance.color_by_field || !field_range) return std::nullopt;
+  if (!appearance.color_by_field || appearance.color_by_field->labels || !field_range)
+    return std::nullopt;
   return std::array{appearance.color_by_field->low.value_or((*field_range)[0]),
                     appearance.color_by_field->high.value_or((*field_range)[1])};
 }
@@ -122,16 +130,17 @@ std::optional<std::array<double, 2>> range_of_colors(
 void Renderer::Implementation::fetch(const FrameRequest &request, Frame &frame) {
   const core::WantedArrays wanted{request.want_picture, request.want_depth, request.want_normals,
                                   request.want_positions, request.want_field};
-  // Without a picture, nothing needs colours, nor the values that they are by.
-  core::Appearance appearance = core_appearance(request.appearance, whole());
+  const core::Appearance appearance = core_appearance(request.appearance, whole());
   const auto range = renderer_->field_range();
   frame.statistics.color_range = range_of_colors(appearance, range);
-  if (renderer_->has_field_values()) {
-    frame.statistics.field_range = range;
-  } else {
-    appearance.color_by_field.reset();
+  if (!request.slices.empty()) {
+    const core::Slices slices =
+        core_slices(request.slices, request.appearance, volume_.value_range);
+    frame.statistics.slice_range = {slices.low, slices.high};
   }
-  move_arrays(renderer_->fetch(wanted, appearance), frame);
+  if (renderer_->has_field_values()) frame.statistics.field_range = range;
+  // Without a picture, nothing needs colours, nor the values that they are by.
+  move_arrays(renderer_->fetch(wanted, of_last_frame(appearance, *renderer_)), frame);
   if (request.want_hits)
     frame.hits = public_hits(renderer_->hits(), volume_, renderer_->abilities().levels);
 }

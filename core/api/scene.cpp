@@ -13,6 +13,7 @@
 #include "core/api/frame_parts.hpp"
 #include "core/api/guarded.hpp"
 #include "core/base/error.hpp"
+#include "core/base/utf8.hpp"
 #include "core/frame/ambient_rays.hpp"
 #include "core/frame/colors.hpp"
 #include "core/frame/surfaces.hpp"
@@ -102,13 +103,15 @@ void read_value(const json &value, const std::string &where, std::array<float, 3
 }
 
 template <class T>
-concept HasFields = std::is_same_v<T, Camera> || std::is_same_v<T, ClipPlane> ||
+concept HasFields =
+    std::is_same_v<T, Annotations> || std::is_same_v<T, Camera> || std::is_same_v<T, ClipPlane> ||
     std::is_same_v<T, Slice> || std::is_same_v<T, Surface> || std::is_same_v<T, Scene>;
 
 /// Calls visit(key, field) for each field.
 template <class Object, class Visit>
 void visit_fields(Object &object, const Visit &visit) {
   using Fields = std::remove_const_t<Object>;
+  if constexpr (std::is_same_v<Fields, Annotations>) for_each_annotations_field(object, visit);
   if constexpr (std::is_same_v<Fields, Camera>) for_each_camera_field(object, visit);
   if constexpr (std::is_same_v<Fields, ClipPlane>) for_each_plane_field(object, visit);
   if constexpr (std::is_same_v<Fields, Surface>) for_each_surface_field(object, visit);
@@ -119,6 +122,7 @@ void visit_fields(Object &object, const Visit &visit) {
 /// Fields without a default.
 template <class Object>
 bool is_needed(std::string_view key) {
+  if constexpr (std::is_same_v<Object, Annotations>) return false;
   if constexpr (std::is_same_v<Object, Camera>) return key == "eye" || key == "at";
   if constexpr (std::is_same_v<Object, ClipPlane>) return key == "normal";
   if constexpr (std::is_same_v<Object, Slice>) return key == "normal";
@@ -255,7 +259,20 @@ std::string text_of_json(const ordered_json &value, const std::string &indent) {
   return value.is_object() ? "{" + text + "}" : "[" + text + "]";
 }
 
-/// Throws  core::Error: what surfaces, planes and camera cannot be
+/// Throws  core::Error: what the scene's annotations cannot be
+void check_annotations(const Scene &scene) {
+  if (!scene.annotations) return;
+  const Appearance &appearance = scene.appearance;
+  if (scene.annotations->color_bar && appearance.color_map.empty() &&
+      appearance.color_table.empty() && scene.slices.empty())
+    throw core::Error("annotations.color_bar: there is no colour map, and no slice");
+  const std::size_t letters = core::count_letters(core::printable_utf8(scene.annotations->units));
+  if (letters > kMostUnits)
+    throw core::Error("annotations.units: {} letters are too many: give at most {}", letters,
+                      kMostUnits);
+}
+
+/// Throws  core::Error: what surfaces, planes, camera and annotations cannot be
 void check(const Scene &scene) {
   if (scene.surfaces.empty()) throw core::Error("surfaces: give at least one");
   std::vector<core::SurfaceStyle> styles;
@@ -274,9 +291,11 @@ void check(const Scene &scene) {
   core::FrameRequest request;
   request.light = core_appearance(scene.appearance, any_volume);  // or throws
   request.shadow_rays = scene.appearance.shadow_rays;
+  request.bounce_rays = scene.appearance.bounce_rays;
   request.light_angle = scene.appearance.light_angle;
   core::check_shadow_rays(request);
   if (scene.camera) core::check_camera(core_camera(*scene.camera), "camera");
+  check_annotations(scene);
 }
 
 Scene scene_from(const json &value) {

@@ -71,8 +71,7 @@ FrameStats TeamRenderer::render(const FrameRequest &request) {
   own_hits_.clear();
   num_hits_.reset();
   has_whole_ = false;
-  FrameRequest own = request;
-  own.ambient_rays = own.shadow_rays = 0;
+  const FrameRequest own = without_light_rays(request);
   FrameStats stats;
   if (!request.surfaces.empty()) {
     draw_layers(own, stats);

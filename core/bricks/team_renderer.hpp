@@ -44,7 +44,7 @@ class TeamRenderer : public Renderer {
 
   Abilities abilities() const override {
     Abilities abilities = renderer_.abilities();
-    abilities.cells = false;
+    abilities.cells = abilities.bounce = false;
     return abilities;
   }
   Team &team() override { return team_; }

@@ -1,5 +1,6 @@
 #include "core/frame/ambient_rays.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -18,16 +19,23 @@ void check_shadow_rays(const FrameRequest &request) {
   if (request.shadow_rays > ISO_MAX_AMBIENT_RAYS)
     throw Error("{} shadow rays of a hit are too many: up to {} can be cast", request.shadow_rays,
                 ISO_MAX_AMBIENT_RAYS);
+  if (request.bounce_rays > ISO_MAX_AMBIENT_RAYS)
+    throw Error("{} bounce rays of a hit are too many: up to {} can be cast", request.bounce_rays,
+                ISO_MAX_AMBIENT_RAYS);
   if (!(request.light_angle > 0 && request.light_angle <= 45))
     throw Error("a light angle of {} degrees is out of range: give more than 0, at most 45",
                 request.light_angle);
   if (request.shadow_rays != 0 && !request.light.towards_light)
     throw Error("shadows need a light of the scene: give its direction");
+  if (request.bounce_rays != 0 && !request.light.towards_light)
+    throw Error("bounced light needs a light of the scene: give its direction");
 }
 
 LightRays light_rays_of(const FrameRequest &request) {
-  LightRays rays{.num_ambient = request.ambient_rays, .num_shadow = request.shadow_rays};
-  if (rays.num_shadow == 0) return rays;
+  LightRays rays{.num_ambient = std::max(request.ambient_rays, request.bounce_rays),
+                 .num_shadow = request.shadow_rays,
+                 .bounces = request.bounce_rays != 0};
+  if (rays.num_shadow == 0 && !rays.bounces) return rays;
   check_shadow_rays(request);
   rays.light = glm::normalize(request.light.towards_light.value());
   rays.angle = request.light_angle;
@@ -85,8 +93,9 @@ std::vector<AmbientDirection> make_light_directions(const LightRays &rays) {
   const glm::dvec3 &light = rays.light;
   const glm::dvec3 other = std::abs(light.z) < 0.5 ? glm::dvec3(0, 0, 1) : glm::dvec3(1, 0, 0);
   const glm::dvec3 u = glm::normalize(glm::cross(light, other)), v = glm::cross(light, u);
-  const double height = rays.num_shadow == 1 ? 0 : 1 - std::cos(glm::radians(rays.angle));
-  for_spiral(rays.num_shadow, [&](const SpiralPoint &point) {
+  const std::uint32_t rows = rays.num_shadow == 0 && rays.bounces ? 1 : rays.num_shadow;
+  const double height = rows == 1 ? 0 : 1 - std::cos(glm::radians(rays.angle));
+  for_spiral(rows, [&](const SpiralPoint &point) {
     const double cosine = 1 - point.area * height, sine = std::sqrt(1 - cosine * cosine);
     directions.push_back(direction_of(cosine * light + sine * std::cos(point.angle) * u +
                                       sine * std::sin(point.angle) * v));

@@ -13,7 +13,8 @@ namespace isowave::core {
 
 /// Throws  Error: more rays than ISO_MAX_AMBIENT_RAYS
 void check_ambient_rays(std::uint32_t num_rays);
-/// Throws  Error: too many shadow rays; a cone that is none; shadows without a light
+/// Throws  Error: too many shadow or bounce rays; a cone that is none; one of the two without a
+/// light
 void check_shadow_rays(const FrameRequest &request);
 
 /// The rays of each hit: first ambient rays, then shadow rays.
@@ -21,6 +22,7 @@ struct LightRays {
   std::uint32_t num_ambient = 0, num_shadow = 0;
   glm::dvec3 light{0, 0, 1};  ///< towards it, world space
   double angle = 0;           ///< of the cone of shadow rays, from its axis [degrees]
+  bool bounces = false;       ///< ambient rays bring light (kernels_cl/portable/bounce.h)
 
   std::uint32_t count() const { return num_ambient + num_shadow; }
   friend bool operator==(const LightRays &, const LightRays &) = default;
@@ -37,7 +39,8 @@ std::vector<AmbientDirection> make_ambient_directions(std::uint32_t num_rays);
 /// Those of ambient rays, and behind them those of shadow rays.
 ///
 /// Returns  [rays.count()][ISO_AMBIENT_PATTERNS]. A single shadow ray goes straight to the light;
-///          several are spread evenly over the disk that their cone makes of the unit sphere
+///          several are spread evenly over the disk that their cone makes of the unit sphere. If
+///          light bounces, and there are no shadow rays, a row more goes straight to the light
 std::vector<AmbientDirection> make_light_directions(const LightRays &rays);
 
 }  // namespace isowave::core

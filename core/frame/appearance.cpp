@@ -73,6 +73,10 @@ Shading make_shading(const VolumeInfo &info, const Appearance &appearance,
   if (appearance.color_by_field) {
     const ColorByField &by = *appearance.color_by_field;
     check_color_by_field(by);
+    if (by.labels) {
+      params.has_map = ISO_MAP_BY_LABEL;
+      return {params, by.colors};
+    }
     const std::array<float, 2> range = field_range.value_or(std::array{0.0f, 0.0f});
     const double low = by.low.value_or(range[0]), high = by.high.value_or(range[1]);
     params.has_map = ISO_MAP_BY_FIELD;
@@ -121,10 +125,10 @@ std::array<double, 2> range_along(const VolumeInfo &info, const glm::dvec3 &axis
 Image8 shade_scalar(const FrameParams &frame, const Shading &shading,
                     const std::vector<HitRecord> &hits, std::uint32_t samples,
                     const OpenCounts &open, const std::vector<float> &field_values) {
+  const LightOfHits light = open.of_hits();
   return image_of_pixels(frame, shading.params, samples, [&](uint column, uint row) {
     return shade_pixel(&frame, &shading.params, shading.color_map.data(), samples, column, row,
-                       hits.data(), open.counts.data(), open.num_ambient, open.num_shadow,
-                       field_values.data());
+                       hits.data(), &light, field_values.data());
   });
 }
 

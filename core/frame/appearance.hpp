@@ -21,6 +21,8 @@ struct ColorByAxis {
   glm::dvec3 axis{0, 0, 1};  ///< world space, of any length above 0
   double low = 0, high = 1;  ///< distances of the first and the last colour [world units]
   ColorTable colors{};
+
+  friend bool operator==(const ColorByAxis &, const ColorByAxis &) = default;
 };
 
 /// Colours of surfaces by the values of a field at the hits (FrameRequest::field_values). Hits
@@ -30,6 +32,11 @@ struct ColorByField {
   /// or in frames of several or translucent surfaces, of the field.
   std::optional<double> low{}, high{};
   ColorTable colors{};
+  /// Values are labels (FrameRequest::field_labels): label L has colour L % ISO_MAP_COLORS, and
+  /// there is no range. Values that are no labels have the surface's own colour.
+  bool labels = false;
+
+  friend bool operator==(const ColorByField &, const ColorByField &) = default;
 };
 
 /// Colours and lights. Colours are display values, [0,1].
@@ -51,6 +58,8 @@ struct Appearance {
   /// The background goes linearly from `background` at the picture's lower edge to this one at the
   /// upper; none: it is uniform.
   std::optional<glm::vec3> background_top{};
+
+  friend bool operator==(const Appearance &, const Appearance &) = default;
 };
 
 /// What shading needs.
@@ -63,11 +72,17 @@ struct Shading {
   ColorTable color_map{};
 };
 
-/// The numbers of ambient and shadow rays of each hit that met nothing.
+/// The numbers of ambient and shadow rays of each hit that met nothing, and bounced light.
 struct OpenCounts {
   std::vector<uchar> counts;      ///< [height * width] by ray; [2] with shadow rays
   std::uint32_t num_ambient = 0;  ///< ambient rays of each hit; 0: there are none
   std::uint32_t num_shadow = 0;   ///< shadow rays of each hit; 0: there are none
+  std::vector<float> bounced{};   ///< [height * width] by ray: LightOfHits::bounced, filtered
+  std::uint32_t num_bounced = 0;  ///< ambient rays in these sums; 0: light does not bounce
+
+  LightOfHits of_hits() const {
+    return {counts.data(), num_ambient, num_shadow, bounced.data(), num_bounced};
+  }
 };
 
 /// Stores GLM's columns as rows [9], scaled so that the largest entry is 1: only directions count.

@@ -1,6 +1,7 @@
 #include "core/frame/field_values.hpp"
 
 #include <algorithm>
+#include <cstring>
 
 #include "core/view/detail.hpp"
 #include "core/volume/pyramid.hpp"
@@ -25,6 +26,21 @@ FieldMap make_field_map(std::span<const VolumeInfo> levels, const VolumeInfo &fi
   return map;
 }
 
+FieldReading reading_of(const FrameRequest &request, const FieldMap &map, bool is_own) {
+  FieldReading reading{map};
+  reading.map.caps_alone = request.field_on_caps ? 1 : 0;
+  reading.map.surfaces = mapped_surfaces(request.surfaces);
+  if (!request.field_labels) return reading;
+  const bool draws_labels = !request.surfaces.empty() && !request.surfaces.front().labels.empty();
+  reading.map.labels = ISO_FIELD_LABELS;
+  if (!is_own || !draws_labels) return reading;
+  reading.map.labels = ISO_FIELD_OWN_LABELS;
+  const LabelTable table = label_table(request.surfaces);
+  reading.label_table.resize(table.size() / sizeof(uint));
+  std::memcpy(reading.label_table.data(), table.data(), table.size());
+  return reading;
+}
+
 std::optional<std::array<float, 2>> known_range(const CompressedVolume &volume) {
   if (volume.value_range == kUnknownRange) return {};
   return volume.value_range;
@@ -35,7 +51,7 @@ Shading make_layer_shading(const VolumeInfo &info, const FrameRequest &request,
   Appearance light = request.light;
   if (!request.field_values) light.color_by_field.reset();
   const auto &by = light.color_by_field;
-  if (by && !(by->low && by->high) && !field_range)
+  if (by && !by->labels && !(by->low && by->high) && !field_range)
     throw Error(
         "the least and the largest value of the field are not known: give the values of the first "
         "and the last colour");

@@ -7,6 +7,7 @@
 
 #include "core/frame/appearance.hpp"
 #include "core/frame/frame_request.hpp"
+#include "core/frame/labels.hpp"
 #include "core/volume/volume.hpp"
 #include "core/zfp/zfp_stream.hpp"
 #include "kernels_cl/portable/field_value.h"
@@ -16,6 +17,18 @@ namespace isowave::core {
 /// levels  of detail that may have hits, the finest first
 /// Throws  Error: a volume's directions do not span space
 FieldMap make_field_map(std::span<const VolumeInfo> levels, const VolumeInfo &field);
+
+/// What hits of a frame read of a field.
+struct FieldReading {
+  FieldMap map{};
+  /// If map.labels is ISO_FIELD_OWN_LABELS: label_table() of the frame's surfaces, as words
+  /// [ISO_NUM_LABELS / 4]; else empty.
+  std::vector<uint> label_table{};
+};
+
+/// map     make_field_map()
+/// is_own  the field is the volume that is drawn
+FieldReading reading_of(const FrameRequest &request, const FieldMap &map, bool is_own);
 
 /// The least and the largest voxel of a volume; none if they are not known.
 std::optional<std::array<float, 2>> known_range(const CompressedVolume &volume);

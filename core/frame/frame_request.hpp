@@ -40,7 +40,7 @@ struct FrameRequest {
   std::vector<SurfaceStyle> surfaces{};
   Slices slices{};  ///< beside surfaces
   /// The light of surfaces[]: passes blend it. Renderer::fetch() adds the background. Shadow rays
-  /// go to its light.
+  /// go to its light. Pictures for max_image_error look like that, too.
   Appearance light{};
   /// Largest distance between voxels of a coarser level of detail [pixels], see
   /// make_level_frames(); 0: the finest level draws all.
@@ -57,20 +57,32 @@ struct FrameRequest {
   /// Whether hits get values of the renderer's field, for Appearance::color_by_field.
   bool field_values = false;
   bool field_on_caps = false;  ///< hits that are no caps have no value
+  /// The field's values are labels: hits have that of the nearest voxel with another label than 0,
+  /// or if the field is the volume whose labels are drawn, with a label of the hit's surface.
+  bool field_labels = false;
   /// Rays from each hit that find out how much of the sky it sees, for shading
   /// (kernels_cl/portable/ambient.h); 0: each hit sees all of it.
   std::uint32_t ambient_rays = 0;
   /// Rays from each hit towards light.towards_light, for its shadows; 0: it casts none. A single
   /// ray gives hard shadows; several are spread over a cone around that direction, for soft ones.
   std::uint32_t shadow_rays = 0;
+  /// Least number of ambient rays if light.towards_light bounces: each hit gets light of it that
+  /// comes by way of one other place of the surface (kernels_cl/portable/bounce.h), by its ambient
+  /// rays. 0: it does not bounce.
+  std::uint32_t bounce_rays = 0;
   double light_angle = 3;  ///< of the cone, from its axis [degrees], up to 45
   /// Largest distance to the true surface [pixels]. voxel_pixels and voxel_error are then chosen so
   /// that most pixels keep it. The true surface is that of the volume before compression, or by
   /// sample that of full detail.
   std::optional<double> max_surface_error{};
   Evidence by = Evidence::kProof;  ///< for max_surface_error; kProof without one
-  /// Views that share max_surface_error: most pixels of all of them together keep it. They are
-  /// drawn with one detail, which is chosen once. Empty: this view alone.
+  /// Largest error of the picture: the mean of FLIP's over all pixels (core/accuracy/flip.hpp),
+  /// against 64 rays a pixel at full detail. The rays of a pixel, up to those of `size`, and
+  /// voxel_pixels are then chosen, by tiles of the picture that `light` describes.
+  std::optional<double> max_image_error{};
+  /// Views that share max_surface_error or max_image_error: most pixels of all of them together, or
+  /// the mean of their pictures, keep it. They are drawn with one detail, which is chosen once.
+  /// Empty: this view alone.
   std::vector<Camera> series{};
   /// Time in which the largest picture possible is drawn (timed_renderer.hpp).
   std::optional<double> time_budget_ms{};
@@ -83,6 +95,12 @@ inline FrameRequest seen_from(const Camera &camera, FrameRequest request) {
   return request;
 }
 
+/// The same request without ambient, shadow and bounce rays.
+inline FrameRequest without_light_rays(FrameRequest request) {
+  request.ambient_rays = request.shadow_rays = request.bounce_rays = 0;
+  return request;
+}
+
 /// The same request with a time budget [ms].
 inline FrameRequest within_ms(double time_budget_ms, FrameRequest request) {
   request.time_budget_ms = time_budget_ms;
@@ -92,6 +110,7 @@ inline FrameRequest within_ms(double time_budget_ms, FrameRequest request) {
 /// The request without a largest error.
 inline FrameRequest without_error(FrameRequest request) {
   request.max_surface_error.reset();
+  request.max_image_error.reset();
   request.by = Evidence::kProof;
   request.series.clear();
   return request;
@@ -101,6 +120,17 @@ inline FrameRequest without_error(FrameRequest request) {
 inline FrameRequest with_detail(FrameRequest request, const Detail &detail) {
   request.voxel_pixels = detail.voxel_pixels;
   request.voxel_error = detail.voxel_error;
+  return request;
+}
+/// The request with what was chosen for its largest error, and without that.
+///
+/// largest  size of a request without one
+inline FrameRequest as_chosen(FrameRequest request, const DetailChoice &choice, ImageSize largest) {
+  request = with_detail(without_error(std::move(request)), choice.detail);
+  if (choice.image) {
+    request.size = request.size.value_or(largest);
+    request.size->samples = choice.image->samples;
+  }
   return request;
 }
 

@@ -84,11 +84,27 @@ struct SampledShare {
   double share() const { return num_hits == 0 ? 1.0 : double(num_within) / double(num_hits); }
 };
 
-/// The detail that was chosen to keep FrameRequest::max_surface_error.
+/// A picture's error, FLIP's mean over all pixels, by tiles of it (core/accuracy/image_error.hpp).
+struct ImageError {
+  std::uint32_t samples = 1;  ///< rays of a pixel along each axis, as chosen
+  std::uint32_t num_tiles = 0;
+  double mean = 0;     ///< of the tiles
+  double highest = 0;  ///< upper end of the confidence interval of the picture's
+  /// Rays and levels that were tried. error: of the tiles, or of those that sufficed to see that it
+  /// is too large, with 0 for the others.
+  struct Try {
+    std::uint32_t samples = 1;
+    double voxel_pixels = 0, error = 0;
+  };
+  std::vector<Try> tries{};
+};
+
+/// The detail that was chosen to keep FrameRequest::max_surface_error or max_image_error.
 struct DetailChoice {
   Detail detail;
-  bool reachable = true;  ///< most pixels keep the error at full detail; true by sample
-  double median = 0;      ///< median bound at full detail [pixels]; 0 by sample
+  /// Most pixels keep the error at full detail; true by sample. A candidate keeps an image error.
+  bool reachable = true;
+  double median = 0;  ///< median bound at full detail [pixels]; 0 by sample
   /// If it is not reachable: a smaller error of the volume's voxels with which the median would be
   /// max_surface_error; none if no such error is known that a volume can be stored with.
   std::optional<double> tolerance{};
@@ -101,7 +117,8 @@ struct DetailChoice {
     double kept = 0;
   };
   std::vector<Try> tries;
-  double total_ms = 0;  ///< of choosing; 0: a series had been chosen for
+  std::optional<ImageError> image{};  ///< of an image error: with what was chosen
+  double total_ms = 0;                ///< of choosing; 0: a series had been chosen for
 };
 
 /// Statistics of a frame.
@@ -124,7 +141,7 @@ struct FrameStats {
   bool cancelled = false;
   bool complete = true;                  ///< false: cancelled, or the time budget was over
   std::vector<TimedStep> steps{};        ///< with a time budget: in the order of drawing
-  std::optional<DetailChoice> detail{};  ///< with a largest surface error
+  std::optional<DetailChoice> detail{};  ///< with a largest surface or image error
 };
 
 }  // namespace isowave::core

@@ -30,4 +30,13 @@ void check_labels(const CompressedVolume &volume) {
                 ISO_NUM_LABELS - 1);
 }
 
+bool are_labels(const CompressedVolume &volume) {
+  try {
+    check_labels(volume);
+    return true;
+  } catch (const Error &) {
+    return false;
+  }
+}
+
 }  // namespace isowave::core

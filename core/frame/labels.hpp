@@ -29,7 +29,8 @@ LabelTable label_table(const std::vector<SurfaceStyle> &surfaces);
 
 /// Whether all voxels of the volume are labels, and decoded as they were.
 ///
-/// Throws  Error: they are not
+/// Throws  Error: they are not. are_labels() throws nothing
 void check_labels(const CompressedVolume &volume);
+bool are_labels(const CompressedVolume &volume);
 
 }  // namespace isowave::core

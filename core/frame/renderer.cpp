@@ -31,11 +31,12 @@ void check_choices(const FrameRequest &request) {
                     what);
     };
     leave_out(has_labels && request.voxel_error != 0, "voxel_error");
-    leave_out(has_labels && request.field_values, "colours by a field");
     leave_out(request.bound != FieldBound::kNone, "bound");
     leave_out(request.voxel_pixels != 0, "voxel_pixels");
     leave_out(request.max_surface_error.has_value(), "max_surface_error");
+    leave_out(request.max_image_error.has_value(), "max_image_error");
     leave_out(request.time_budget_ms.has_value(), "time_budget_ms");
+    leave_out(request.bounce_rays != 0, "bounced light");
     if (light_rays_of(request).count() != 0) check_some_are_opaque(request.surfaces);
   }
   if (request.field_values && request.time_budget_ms)
@@ -43,18 +44,48 @@ void check_choices(const FrameRequest &request) {
   if (!request.max_surface_error) {
     if (request.by == Evidence::kSample)
       throw Error("a sample is evidence for max_surface_error: give max_surface_error");
-    if (!request.series.empty())
-      throw Error("a series of views shares max_surface_error: give max_surface_error");
-    return;
+    if (!request.max_image_error) {
+      if (!request.series.empty())
+        throw Error("a series of views shares an error: give max_surface_error or max_image_error");
+      return;
+    }
+  } else if (request.max_image_error) {
+    throw Error("a frame keeps one error: give max_surface_error or max_image_error");
   }
   if (request.time_budget_ms)
     throw Error("a frame cannot keep both an error and a time: give one of the two");
   if (request.voxel_pixels != 0 || request.voxel_error != 0)
-    throw Error("max_surface_error chooses the detail: leave out voxel_pixels and voxel_error");
+    throw Error("{} chooses the detail: leave out voxel_pixels and voxel_error",
+                request.max_surface_error ? "max_surface_error" : "max_image_error");
   if (request.bound != FieldBound::kNone)
     throw Error("the surface of a bound has no error: draw the volume itself");
-  if (!request.clip.planes.empty() && request.by == Evidence::kProof)
+  if (request.max_surface_error && !request.clip.planes.empty() && request.by == Evidence::kProof)
     throw Error("errors are proven of whole surfaces: leave out clip, or judge by sample");
+}
+
+/// Throws  Error with that text: it is asked for, and cannot be had
+void need(bool is_asked, bool is_able, const char *text) {
+  if (is_asked && !is_able) throw Error("{}", text);
+}
+
+/// Throws  Error: the request asks for an error or a time that the renderer does not keep
+void need_choices(const FrameRequest &request, const Abilities &abilities) {
+  const bool by_sample = request.by == Evidence::kSample;
+  need(request.max_surface_error && !by_sample, abilities.surface_error,
+       "this renderer knows no bounds of the error: leave out max_surface_error, judge it by "
+       "sample, or draw on the host, or on a device by a renderer that was made with_bounds");
+  need(by_sample, abilities.sampled_error,
+       "this renderer chooses no detail: leave out max_surface_error");
+  need(request.max_image_error.has_value(), abilities.image_error,
+       "this renderer chooses no detail: leave out max_image_error");
+  if (request.max_image_error && abilities.most_rays < kImageErrorRays)
+    throw Error(
+        "max_image_error looks at parts of the picture with {} rays, and the renderer was made for "
+        "{}: make it for larger pictures",
+        kImageErrorRays, abilities.most_rays);
+  need(request.time_budget_ms.has_value(), abilities.time_budget,
+       "this renderer keeps no time: leave out time_budget_ms, or draw on the host, or on a device "
+       "by a renderer that was made with_time_budget");
 }
 
 }  // namespace
@@ -62,6 +93,12 @@ void check_choices(const FrameRequest &request) {
 void check_max_surface_error(double max_surface_error) {
   if (!(max_surface_error > 0) || !std::isfinite(max_surface_error))
     throw Error("an error of {} pixels cannot be kept: give more than 0", max_surface_error);
+}
+
+void check_max_image_error(double max_image_error) {
+  if (!(max_image_error > 0 && max_image_error <= 1))
+    throw Error("an error of {} of a picture cannot be kept: give more than 0, up to 1",
+                max_image_error);
 }
 
 void check_time_budget(double budget_ms) {
@@ -80,15 +117,13 @@ void check(const FrameRequest &request, const Abilities &abilities) {
   check_clip(request.clip);
   check_surfaces(request.surfaces, request.slices);
   if (request.max_surface_error) check_max_surface_error(*request.max_surface_error);
+  if (request.max_image_error) check_max_image_error(*request.max_image_error);
   if (request.time_budget_ms) check_time_budget(*request.time_budget_ms);
   check_choices(request);
   if (size.num_rays() > abilities.most_rays) {
     throw Error("{}x{} pixels have more than the {} rays that the renderer was made for",
                 size.width, size.height, abilities.most_rays);
   }
-  const auto need = [](bool is_asked, bool is_able, const char *text) {
-    if (is_asked && !is_able) throw Error("{}", text);
-  };
   need(request.camera.parallel_height.has_value(), abilities.parallel,
        "this renderer draws in perspective alone: leave out parallel projection");
   need(!request.clip.planes.empty(), abilities.clipping,
@@ -96,6 +131,10 @@ void check(const FrameRequest &request, const Abilities &abilities) {
   need(request.field_values, abilities.field,
        abilities.cells ? "this renderer has no field to colour by: make it with one"
                        : "a team draws without colours by a field: leave them out");
+  need(
+      request.field_values && request.field_labels, abilities.field_labels,
+      "the field's voxels are no labels, exact whole numbers from 0 to 65535: leave out colours by "
+      "label");
   need(!request.surfaces.empty() && light_rays_of(request).count() != 0, abilities.cells,
        "a team draws several or translucent surfaces without ambient and shadow rays: leave them "
        "out");
@@ -129,15 +168,10 @@ void check(const FrameRequest &request, const Abilities &abilities) {
        "ambient rays need a renderer that was made with_rays");
   need(request.shadow_rays != 0, abilities.given_rays,
        "shadow rays need a renderer that was made with_rays");
-  const bool by_sample = request.by == Evidence::kSample;
-  need(request.max_surface_error && !by_sample, abilities.surface_error,
-       "this renderer knows no bounds of the error: leave out max_surface_error, judge it by "
-       "sample, or draw on the host, or on a device by a renderer that was made with_bounds");
-  need(by_sample, abilities.sampled_error,
-       "this renderer chooses no detail: leave out max_surface_error");
-  need(request.time_budget_ms.has_value(), abilities.time_budget,
-       "this renderer keeps no time: leave out time_budget_ms, or draw on the host, or on a device "
-       "by a renderer that was made with_time_budget");
+  need(request.bounce_rays != 0, abilities.bounce,
+       abilities.cells ? "bounced light needs a renderer that was made with_bounce"
+                       : "a team draws without bounced light: leave it out");
+  need_choices(request, abilities);
 }
 
 Image8 Renderer::shade(const Appearance &appearance) {
@@ -149,7 +183,7 @@ Shading Renderer::shading_of(const VolumeInfo &info, const Appearance &appearanc
   const auto &by = appearance.color_by_field;
   if (by && !has_field_values())
     throw Error("the last frame has no values of a field: ask for field_values");
-  const bool needs_range = by && !(by->low && by->high);
+  const bool needs_range = by && !by->labels && !(by->low && by->high);
   return make_shading(info, appearance, needs_range ? field_range() : std::nullopt);
 }
 

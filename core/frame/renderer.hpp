@@ -28,19 +28,25 @@ struct Abilities {
   bool fewer_planes = false;       ///< FrameRequest::voxel_error
   bool bounds = false;             ///< FrameRequest::bound
   bool given_rays = false;         ///< FrameRequest::ambient_rays and shadow_rays, cast_rays()
+  bool bounce = false;             ///< FrameRequest::bounce_rays
   bool cells = true;               ///< hits name their cell: HitRecord::block_id
   bool surface_error = false;      ///< FrameRequest::max_surface_error, by proof
   bool sampled_error = false;      ///< FrameRequest::max_surface_error, by sample
+  bool image_error = false;        ///< FrameRequest::max_image_error
   bool time_budget = false;        ///< FrameRequest::time_budget_ms
   bool kept_picture = false;       ///< keep_picture(), fill_from_kept(), enlarge_kept()
   bool parallel = true;            ///< Camera::parallel_height
   bool clipping = false;           ///< FrameRequest::clip
   bool field = false;              ///< FrameRequest::field_values
+  bool field_labels = false;       ///< FrameRequest::field_labels
   std::size_t most_surfaces = 0;   ///< of FrameRequest::surfaces
   bool labels = false;             ///< surfaces of labels
   bool isosurfaces = true;         ///< false: surfaces of labels alone
   Solver solver = kDefaultSolver;  ///< the root finder
 };
+
+/// Rays of a frame that a renderer must be able to draw for FrameRequest::max_image_error.
+inline constexpr std::uint64_t kImageErrorRays = 1 << 16;
 
 /// Why a renderer without Abilities::isosurfaces refuses.
 inline constexpr const char *kDrawsLabelsAlone =
@@ -51,6 +57,8 @@ void check(const FrameRequest &request, const Abilities &abilities);
 
 /// Throws  Error unless the error is finite and above 0
 void check_max_surface_error(double max_surface_error);
+/// Throws  Error unless the error is above 0 and not above 1
+void check_max_image_error(double max_image_error);
 /// Throws  Error unless the budget is finite and above 0
 void check_time_budget(double budget_ms);
 

@@ -137,13 +137,11 @@ FrameRequest TimedRenderer::request_of(const FrameRequest &request, std::size_t 
   const Abilities can = abilities();
   const ImageSize full = size_of(request, can);
   const double scale = std::ldexp(1.0, static_cast<int>(step)) / full.samples;  // of its pixels
-  FrameRequest smaller = request;
+  FrameRequest smaller = step == 0 ? request : without_light_rays(request);
   smaller.time_budget_ms.reset();
   smaller.size = halved(full, static_cast<unsigned>(step));
-  if (step != 0) {
+  if (step != 0)
     smaller.voxel_pixels = std::max(levels_pay_ ? 1.0 : 0.0, request.voxel_pixels / scale);
-    smaller.ambient_rays = smaller.shadow_rays = 0;
-  }
   return smaller;
 }
 

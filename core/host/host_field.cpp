@@ -1,12 +1,11 @@
 #include "core/host/host_field.hpp"
 
-#include "core/frame/field_values.hpp"
 #include "core/view/frame.hpp"
 
 namespace isowave::core {
 
 float value_at_hit(const FieldMap &map, const FrameParams &grid, const HostField &decoded,
-                   const HitRecord &hit) {
+                   const HitRecord &hit, const uint *label_table) {
   const FieldPlace place = field_place(&map, hit);
   if (!is_in_field(place)) return no_value();
   const BlockCoords base = field_base(place);
@@ -29,23 +28,27 @@ float value_at_hit(const FieldMap &map, const FrameParams &grid, const HostField
     const std::size_t block = level_block_at(&grid, x / 4, y / 4, z / 4);
     corners[c] = decoded.values[ISO_BLOCK_VOXELS * block + x % 4 + 4 * (y % 4) + 16 * (z % 4)];
   }
-  return field_value(corners, place.at);
+  return value_of_hit(&map, label_table, hit, corners, place.at);
 }
 
-HostFieldValues::HostFieldValues(const CompressedVolume &field, std::span<const VolumeInfo> levels,
-                                 HostRoom &room, std::uint32_t num_threads)
+HostFieldValues::HostFieldValues(const CompressedVolume &field, bool is_own,
+                                 std::span<const VolumeInfo> levels, HostRoom &room,
+                                 std::uint32_t num_threads)
     : range_(known_range(field)),
+      is_own_(is_own),
       map_(make_field_map(levels, field.info)),
+      reading_{map_},
       grid_(make_grid_params(field.info)),
       blocks_(field, room, num_threads),
       decoded_((blocks_.select(0), blocks_.field())) {}
 
-void HostFieldValues::operator()(std::span<const HitRecord> hits, bool on_caps,
-                                 float *values) const {
-  FieldMap map = map_;
-  map.caps_alone = on_caps ? 1 : 0;
+void HostFieldValues::begin_frame(const FrameRequest &request) {
+  reading_ = reading_of(request, map_, is_own_);
+}
+
+void HostFieldValues::operator()(std::span<const HitRecord> hits, float *values) const {
   for (std::size_t i = 0; i < hits.size(); ++i)
-    values[i] = value_at_hit(map, grid_, decoded_, hits[i]);
+    values[i] = value_at_hit(reading_.map, grid_, decoded_, hits[i], reading_.label_table.data());
 }
 
 }  // namespace isowave::core

@@ -45,7 +45,8 @@ inline bool find_in_cell(const FrameParams &frame, const HostField &field, const
   return true;
 }
 
-/// The first crossing of a ray behind a cell, `at`, of its way.
+/// The first crossing of a ray behind a cell, `at`, of its way. kTraceBlock: as walk_blocks()
+template <auto kTraceBlock>
 inline bool walk_behind(const FrameParams &frame, const HostField &field, const ActiveBox &box,
                         LastPlanes last, const Ray &ray, CellWalk at, HitRecord *next) {
   if (at.exit.axis == ISO_AXIS_START) return false;
@@ -62,17 +63,30 @@ inline bool walk_behind(const FrameParams &frame, const HostField &field, const 
                               block.z / ISO_MACROCELL_BLOCKS, kMacrocellVoxels, last);
   if (!leaves(&block, &coarse, enter)) {
     walk_step(&block, &ray, enter, 4, last);
-    const WalkEnd end = walk_blocks(frame, field, last, ray, coarse,
-                                    macrocell_mask(frame, field, coarse), block, &enter, next);
+    const WalkEnd end = walk_blocks<kTraceBlock>(
+        frame, field, last, ray, coarse, macrocell_mask(frame, field, coarse), block, &enter, next);
     if (end != WalkEnd::kLeft) return end == WalkEnd::kHit;
   }
   walk_step(&coarse, &ray, enter, kMacrocellVoxels, last);
-  return walk_macrocells(frame, field, box, last, ray, coarse, enter, next);
+  return walk_macrocells<kTraceBlock>(frame, field, box, last, ray, coarse, enter, next);
+}
+
+/// The next hit of a ray in the cell of one that it has on the same surface, which is no cap.
+///
+/// Returns  whether there is one
+inline bool trace_ray_in_cell(const HostLevel &surface, uint ray_id, const HitRecord &hit,
+                              HitRecord *next) {
+  const Ray ray = ray_of_level(surface, ray_id);
+  const CellWalk at = cell_of_hit(surface.frame, last_planes(&surface.frame), ray, hit);
+  return find_in_cell(surface.frame, surface.field, ray, at, hit, next);
 }
 
 /// The hit of a ray behind one that it has on the same surface, as the scalar twin finds it.
 ///
+/// kTraceRay, kTraceRayInCell, kTraceBlock  walk_ray(), trace_ray_in_cell() and trace_block() as
+///                                          functions of their own: they are long
 /// Returns  whether there is one
+template <auto kTraceRay, auto kTraceRayInCell, auto kTraceBlock>
 inline bool trace_ray_behind(const HostLevel &surface, uint ray_id, const HitRecord &hit,
                              HitRecord *next) {
   const FrameParams &frame = surface.frame;
@@ -80,18 +94,10 @@ inline bool trace_ray_behind(const HostLevel &surface, uint ray_id, const HitRec
   const Ray ray = ray_of_level(surface, ray_id);
   const ActiveBox box = active_box(frame.surface, last);
   // A cap lies where the ray begins, maybe outside the box.
-  if (is_cap(hit)) return walk_ray(frame, surface.field, box, last, ray, next);
-  const CellWalk at = cell_of_hit(frame, last, ray, hit);
-  return find_in_cell(frame, surface.field, ray, at, hit, next) ||
-         walk_behind(frame, surface.field, box, last, ray, at, next);
-}
-
-/// The same within the cell of the hit, which is no cap.
-inline bool trace_ray_in_cell(const HostLevel &surface, uint ray_id, const HitRecord &hit,
-                              HitRecord *next) {
-  const Ray ray = ray_of_level(surface, ray_id);
-  const CellWalk at = cell_of_hit(surface.frame, last_planes(&surface.frame), ray, hit);
-  return find_in_cell(surface.frame, surface.field, ray, at, hit, next);
+  if (is_cap(hit)) return kTraceRay(frame, surface.field, box, last, ray, next);
+  return kTraceRayInCell(surface, ray_id, hit, next) ||
+         walk_behind<kTraceBlock>(frame, surface.field, box, last, ray,
+                                  cell_of_hit(frame, last, ray, hit), next);
 }
 
 /// Eight rays of a frame on their way through layers: 4 columns and 2 rows from (x, y) on. Bits of
@@ -138,7 +144,7 @@ inline float value_of_color(const LayerBlend &by, const HostLevel &level, const 
   if (is_of_slice(&by.colors, hit)) {
     value = value_at_hit(by.slice_map, level.frame, level.field, hit);
   } else if (by.field != nullptr && has_value_color(&by.shading.params, &by.colors, hit)) {
-    (*by.field)({&hit, 1}, by.field_on_caps, &value);
+    (*by.field)({&hit, 1}, &value);
   }
   return value;
 }

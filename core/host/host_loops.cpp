@@ -76,18 +76,39 @@ inline ulong inside(const float *values, float isovalue) {
   return bits;
 }
 
-// Three loops trace rays: each calls this, which is long.
+// Several loops trace rays, and blocks behind hits: they call these, which are long.
 ISO_OF_ITS_OWN ISO_WHOLE_LOOP bool trace_ray_anywhere(const FrameParams &frame,
                                                       const HostField &field, const ActiveBox &box,
                                                       LastPlanes last, const Ray &ray,
                                                       HitRecord *hit) {
   return walk_ray(frame, field, box, last, ray, hit);
 }
+ISO_OF_ITS_OWN ISO_WHOLE_LOOP bool trace_block_anywhere(const FrameParams &frame,
+                                                        const HostField &field, const Ray &ray,
+                                                        const GridWalk &block, RayEvent enter,
+                                                        LastPlanes last, HitRecord *hit) {
+  return trace_block(frame, field, ray, block, enter, last, hit);
+}
+ISO_OF_ITS_OWN ISO_WHOLE_LOOP bool trace_ray_in_cell_anywhere(const HostLevel &surface, uint ray_id,
+                                                              const HitRecord &hit,
+                                                              HitRecord *next) {
+  return trace_ray_in_cell(surface, ray_id, hit, next);
+}
 #ifdef ISO_HAS_WIDE_LOOPS
 ISO_OF_ITS_OWN ISO_WIDE_LOOP bool trace_ray_wide(const FrameParams &frame, const HostField &field,
                                                  const ActiveBox &box, LastPlanes last,
                                                  const Ray &ray, HitRecord *hit) {
   return walk_ray(frame, field, box, last, ray, hit);
+}
+ISO_OF_ITS_OWN ISO_WIDE_LOOP bool trace_block_wide(const FrameParams &frame, const HostField &field,
+                                                   const Ray &ray, const GridWalk &block,
+                                                   RayEvent enter, LastPlanes last,
+                                                   HitRecord *hit) {
+  return trace_block(frame, field, ray, block, enter, last, hit);
+}
+ISO_OF_ITS_OWN ISO_WIDE_LOOP bool trace_ray_in_cell_wide(const HostLevel &surface, uint ray_id,
+                                                         const HitRecord &hit, HitRecord *next) {
+  return trace_ray_in_cell(surface, ray_id, hit, next);
 }
 #endif
 
@@ -123,12 +144,47 @@ inline void cast(const FrameParams &frame, const HostField &field, const IndexRa
   }
 }
 
+/// Rays of any origin through a level of detail, for light.
+template <auto kTraceRay>
+struct LightCaster {
+  LightCaster(const HostLevel &through, float voxel_of_level)
+      : level(through),
+        last(last_planes(&through.frame)),
+        box(active_box(through.frame.surface, last)),
+        voxel(voxel_of_level) {}
+
+  /// Does the ray meet a surface that is drawn? met: where it does.
+  bool meets(const GivenRay &given, HitRecord *met) const {
+    return kTraceRay(level.frame, level.field, box, last, make_given_ray(given), met) &&
+           (level.clip == nullptr ||
+            !is_clipped(level.clip, given, voxel, met->t / level.frame.view.t_scale));
+  }
+
+  const HostLevel &level;
+  LastPlanes last;
+  ActiveBox box;
+  float voxel;  ///< AmbientRays::voxel
+};
+
+/// The light that an ambient ray of a round brings from what it has met.
+template <auto kTraceRay>
+inline float bounced_light(const LightCaster<kTraceRay> &caster, const AmbientRays &rays,
+                           const GivenRay &given, const HitRecord &met, uint round, uint pattern) {
+  const uint num_ambient = rays.params.num_ambient;
+  const uint row = num_ambient + light_row(rays.num_rays - num_ambient, round);
+  float cosine = 0;
+  HitRecord between;
+  const GivenRay to_light =
+      bounce_ray(&rays.params, given, placed_hit(&caster.level.frame, rays.level, met),
+                 rays.directions[row * ISO_AMBIENT_PATTERNS + pattern], &cosine);
+  return is_given(to_light) && !caster.meets(to_light, &between) ? cosine : 0.0f;
+}
+
 template <auto kTraceRay>
 inline void ambient(const HostLevel &level, const RayTile &tile, const AmbientRays &rays,
-                    const HitRecord *hits, uchar *open_counts) {
+                    const HitRecord *hits, uchar *open_counts, float *bounced) {
   const FrameParams &frame = level.frame;
-  const LastPlanes last = last_planes(&frame);
-  const ActiveBox box = active_box(frame.surface, last);
+  const LightCaster<kTraceRay> caster(level, rays.voxel);
   HitRecord met;
   for (uint y = tile.begin_y; y < tile.end_y; ++y) {
     for (uint x = tile.begin_x; x < tile.end_x; ++x) {
@@ -137,21 +193,36 @@ inline void ambient(const HostLevel &level, const RayTile &tile, const AmbientRa
       const HitRecord placed = placed_hit(&frame, rays.level, hits[ray_id]);
       const uint pattern = ambient_pattern(&frame, ray_id);
       uint num_open[2] = {0, 0};
+      float brought = 0;
       for (uint k = 0; k < rays.num_rays; ++k) {
         const GivenRay given = ambient_ray(rays.seen, &rays.params, placed, ray_id, k,
                                            rays.directions[k * ISO_AMBIENT_PATTERNS + pattern]);
         if (!is_given(given)) continue;
-        const bool meets = kTraceRay(frame, level.field, box, last, make_given_ray(given), &met);
-        num_open[is_shadow_ray(&rays.params, k)] +=
-            !meets || (level.clip != nullptr &&
-                       is_clipped(level.clip, given, rays.voxel, met.t / frame.view.t_scale));
+        const bool is_shadow = is_shadow_ray(&rays.params, k), meets = caster.meets(given, &met);
+        num_open[is_shadow] += !meets;
+        if (meets && !is_shadow && rays.bounces)
+          brought += bounced_light(caster, rays, given, met, k, pattern);
       }
+      if (rays.bounces) bounced[ray_id] = brought;
       open_counts[ray_id] = static_cast<uchar>(num_open[0]);
       if (rays.num_rays != rays.params.num_ambient)
         open_counts[frame.view.width * frame.view.height + ray_id] =
             static_cast<uchar>(num_open[1]);
     }
   }
+}
+
+inline void place_hits(const FrameParams &frame, const AmbientParams &params, uint row,
+                       const HitRecord *hits, GivenRay *places) {
+  const uint width = frame.view.width;
+  for (uint ray_id = width * row; ray_id < width * (row + 1); ++ray_id)
+    places[ray_id] = normal_ray(&frame, &params, ray_id, hits[ray_id]);
+}
+
+inline void filter_bounced(const View &view, uint row, uint apart, const GivenRay *places,
+                           const float *bounced, float *filtered) {
+  for (uint ray_id = view.width * row; ray_id < view.width * (row + 1); ++ray_id)
+    filtered[ray_id] = filtered_light(view.width, view.height, places, bounced, ray_id, apart);
 }
 
 inline void store_pixel(uint rgba, uint channels, std::uint8_t *pixel) {
@@ -161,12 +232,12 @@ inline void store_pixel(uint rgba, uint channels, std::uint8_t *pixel) {
 }
 
 inline void shade(const FrameParams &frame, const Shading &shading, uint samples, uint row,
-                  const HitRecord *hits, const uchar *open_counts, uint num_ambient,
-                  uint num_shadow, const float *field_values, std::uint8_t *picture) {
+                  const HitRecord *hits, const LightOfHits &light, const float *field_values,
+                  std::uint8_t *picture) {
   const uint columns = frame.view.width / samples, channels = num_channels(&shading.params);
   for (uint column = 0; column < columns; ++column, picture += channels) {
     store_pixel(shade_pixel(&frame, &shading.params, shading.color_map.data(), samples, column, row,
-                            hits, open_counts, num_ambient, num_shadow, field_values),
+                            hits, &light, field_values),
                 channels, picture);
   }
 }
@@ -205,15 +276,22 @@ ISO_WHOLE_LOOP void cast_anywhere(const FrameParams &frame, const HostField &fie
 }
 ISO_WHOLE_LOOP void ambient_anywhere(const HostLevel &level, const RayTile &tile,
                                      const AmbientRays &rays, const HitRecord *hits,
-                                     uchar *open_counts) {
-  ambient<trace_ray_anywhere>(level, tile, rays, hits, open_counts);
+                                     uchar *open_counts, float *bounced) {
+  ambient<trace_ray_anywhere>(level, tile, rays, hits, open_counts, bounced);
+}
+ISO_WHOLE_LOOP void place_hits_anywhere(const FrameParams &frame, const AmbientParams &params,
+                                        uint row, const HitRecord *hits, GivenRay *places) {
+  place_hits(frame, params, row, hits, places);
+}
+ISO_WHOLE_LOOP void filter_bounced_anywhere(const View &view, uint row, uint apart,
+                                            const GivenRay *places, const float *bounced,
+                                            float *filtered) {
+  filter_bounced(view, row, apart, places, bounced, filtered);
 }
 ISO_WHOLE_LOOP void shade_anywhere(const FrameParams &frame, const Shading &shading, uint samples,
-                                   uint row, const HitRecord *hits, const uchar *open_counts,
-                                   uint num_ambient, uint num_shadow, const float *field_values,
-                                   std::uint8_t *picture) {
-  shade(frame, shading, samples, row, hits, open_counts, num_ambient, num_shadow, field_values,
-        picture);
+                                   uint row, const HitRecord *hits, const LightOfHits &light,
+                                   const float *field_values, std::uint8_t *picture) {
+  shade(frame, shading, samples, row, hits, light, field_values, picture);
 }
 
 ISO_OF_ITS_OWN ISO_WHOLE_LOOP void smooth_hit_anywhere(const HostLevel &level, HitRecord *hit) {
@@ -222,7 +300,8 @@ ISO_OF_ITS_OWN ISO_WHOLE_LOOP void smooth_hit_anywhere(const HostLevel &level, H
 ISO_OF_ITS_OWN ISO_WHOLE_LOOP bool trace_ray_behind_anywhere(const HostLevel &surface, uint ray_id,
                                                              const HitRecord &hit,
                                                              HitRecord *next) {
-  return trace_ray_behind(surface, ray_id, hit, next);
+  return trace_ray_behind<trace_ray_anywhere, trace_ray_in_cell_anywhere, trace_block_anywhere>(
+      surface, ray_id, hit, next);
 }
 ISO_WHOLE_LOOP uint blend_rays_anywhere(std::span<const HostLevel> surfaces, const LayerBlend &by,
                                         const RayTile &tile, HitRecord *next, HitRecord *hits,
@@ -288,27 +367,31 @@ ISO_WIDE_LOOP void cast_wide(const FrameParams &frame, const HostField &field, c
   cast<trace_ray_wide>(frame, field, rays, num_rays, is_smooth, hits);
 }
 ISO_WIDE_LOOP void ambient_wide(const HostLevel &level, const RayTile &tile,
-                                const AmbientRays &rays, const HitRecord *hits,
-                                uchar *open_counts) {
-  ambient<trace_ray_wide>(level, tile, rays, hits, open_counts);
+                                const AmbientRays &rays, const HitRecord *hits, uchar *open_counts,
+                                float *bounced) {
+  ambient<trace_ray_wide>(level, tile, rays, hits, open_counts, bounced);
+}
+ISO_WIDE_LOOP void place_hits_wide(const FrameParams &frame, const AmbientParams &params, uint row,
+                                   const HitRecord *hits, GivenRay *places) {
+  place_hits(frame, params, row, hits, places);
+}
+ISO_WIDE_LOOP void filter_bounced_wide(const View &view, uint row, uint apart,
+                                       const GivenRay *places, const float *bounced,
+                                       float *filtered) {
+  filter_bounced(view, row, apart, places, bounced, filtered);
 }
 ISO_WIDE_LOOP void shade_wide(const FrameParams &frame, const Shading &shading, uint samples,
-                              uint row, const HitRecord *hits, const uchar *open_counts,
-                              uint num_ambient, uint num_shadow, const float *field_values,
-                              std::uint8_t *picture) {
-  shade(frame, shading, samples, row, hits, open_counts, num_ambient, num_shadow, field_values,
-        picture);
+                              uint row, const HitRecord *hits, const LightOfHits &light,
+                              const float *field_values, std::uint8_t *picture) {
+  shade(frame, shading, samples, row, hits, light, field_values, picture);
 }
 ISO_OF_ITS_OWN ISO_WIDE_LOOP void smooth_hit_wide(const HostLevel &level, HitRecord *hit) {
   smooth_gradient(level.frame, level.field, last_planes(&level.frame), hit);
 }
 ISO_OF_ITS_OWN ISO_WIDE_LOOP bool trace_ray_behind_wide(const HostLevel &surface, uint ray_id,
                                                         const HitRecord &hit, HitRecord *next) {
-  return trace_ray_behind(surface, ray_id, hit, next);
-}
-ISO_OF_ITS_OWN ISO_WIDE_LOOP bool trace_ray_in_cell_wide(const HostLevel &surface, uint ray_id,
-                                                         const HitRecord &hit, HitRecord *next) {
-  return trace_ray_in_cell(surface, ray_id, hit, next);
+  return trace_ray_behind<trace_ray_wide, trace_ray_in_cell_wide, trace_block_wide>(surface, ray_id,
+                                                                                    hit, next);
 }
 ISO_WIDE_LOOP uint blend_wide(std::span<const HostLevel> surfaces, const LayerBlend &by,
                               const RayTile &tile, HitRecord *next, HitRecord *hits,
@@ -340,11 +423,6 @@ uint trace_levels_sse4(std::span<const HostLevel> levels, const RayTile &tile, b
       trace_levels<trace_band_packet_sse4, side_anywhere>(levels, tile, hits), levels, tile,
       is_smooth, hits);
 }
-ISO_OF_ITS_OWN ISO_WHOLE_LOOP bool trace_ray_in_cell_anywhere(const HostLevel &surface, uint ray_id,
-                                                              const HitRecord &hit,
-                                                              HitRecord *next) {
-  return trace_ray_in_cell(surface, ray_id, hit, next);
-}
 uint blend_sse4(std::span<const HostLevel> surfaces, const LayerBlend &by, const RayTile &tile,
                 HitRecord *next, HitRecord *hits, RayColor *colors, LayerStats *stats) {
   return blend<trace_packets_behind<trace_ray_in_cell_anywhere, trace_packet_behind_sse4>,
@@ -367,16 +445,17 @@ bool is_wide() {
 constexpr HostLoops kLoops[] = {
     {decode_anywhere, ranges_anywhere, inside_anywhere, trace_rays<trace_rays_of_levels_anywhere>,
      trace_rays<trace_rays_of_levels_anywhere>, trace_rays_of_levels_anywhere,
-     trace_rays_of_levels_anywhere, cast_anywhere, ambient_anywhere, shade_anywhere,
-     blend_rays_anywhere, blend_rays_anywhere, shade_layers_anywhere},
+     trace_rays_of_levels_anywhere, cast_anywhere, ambient_anywhere, place_hits_anywhere,
+     filter_bounced_anywhere, shade_anywhere, blend_rays_anywhere, blend_rays_anywhere,
+     shade_layers_anywhere},
 #ifdef ISO_HAS_WIDE_LOOPS
     {decode_anywhere, ranges_anywhere, inside_anywhere, trace_sse4,
      trace_rays<trace_rays_of_levels_anywhere>, trace_levels_sse4, trace_rays_of_levels_anywhere,
-     cast_anywhere, ambient_anywhere, shade_anywhere, blend_sse4, blend_rays_anywhere,
-     shade_layers_anywhere},
+     cast_anywhere, ambient_anywhere, place_hits_anywhere, filter_bounced_anywhere, shade_anywhere,
+     blend_sse4, blend_rays_anywhere, shade_layers_anywhere},
     {decode_wide, ranges_wide, inside_wide, trace_wide, trace_rays<trace_rays_of_levels_wide>,
-     trace_levels_wide, trace_rays_of_levels_wide, cast_wide, ambient_wide, shade_wide, blend_wide,
-     blend_rays_wide, shade_layers_wide},
+     trace_levels_wide, trace_rays_of_levels_wide, cast_wide, ambient_wide, place_hits_wide,
+     filter_bounced_wide, shade_wide, blend_wide, blend_rays_wide, shade_layers_wide},
 #endif
 };
 

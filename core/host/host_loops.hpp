@@ -13,7 +13,7 @@
 #include "core/frame/appearance.hpp"
 #include "core/frame/surfaces.hpp"
 #include "core/view/given_rays.hpp"
-#include "kernels_cl/portable/ambient.h"
+#include "kernels_cl/portable/bounce.h"
 #include "kernels_cl/portable/clip.h"
 #include "kernels_cl/portable/layers.h"
 #include "kernels_cl/portable/ray_state.h"
@@ -121,6 +121,7 @@ struct AmbientRays {
   const FrameParams *seen;             ///< the frame of the finest level that draws
   uint level;                          ///< of the hits, counted from that one
   float voxel;                         ///< of the level [voxels of the finest level]
+  bool bounces = false;                ///< ambient rays bring light (portable/bounce.h)
 };
 
 /// How the surfaces of a frame are blended.
@@ -132,7 +133,6 @@ struct LayerBlend {
   ClipParams clip{};                       ///< of slices
   FieldMap slice_map{};                    ///< from hits on slices to the volume
   const HostFieldValues *field = nullptr;  ///< for colours of the surfaces; null: none
-  bool field_on_caps = false;              ///< FrameRequest::field_on_caps
   AmbientRays rays{};                      ///< of the hits of each layer
   std::vector<std::size_t> opaque{};       ///< the surfaces that such rays may meet
 };
@@ -171,17 +171,27 @@ struct HostLoops {
                uint num_rays, bool is_smooth, HitRecord *hits);
   /// Counts the ambient rays of a tile's hits in a level of detail that meet nothing in that level,
   /// or what is clipped, into open_counts [height * width], and such shadow rays behind them.
+  ///
+  /// bounced  [height * width] gets sums of the light that ambient rays bring, if they do
   void (*ambient)(const HostLevel &level, const RayTile &tile, const AmbientRays &rays,
-                  const HitRecord *hits, uchar *open_counts);
+                  const HitRecord *hits, uchar *open_counts, float *bounced);
+  /// The normal_ray()s of a row of rays, into places [height * width].
+  void (*place_hits)(const FrameParams &frame, const AmbientParams &params, uint row,
+                     const HitRecord *hits, GivenRay *places);
+  /// A step of the filter of bounced light, for a row of rays, see filtered_light().
+  ///
+  /// bounced   [height * width]
+  /// filtered  [height * width]; gets the row
+  void (*filter_bounced)(const View &view, uint row, uint apart, const GivenRay *places,
+                         const float *bounced, float *filtered);
   /// Shades a row of the picture of the frame's hits [height * width].
   ///
   /// samples      rays per pixel along each axis
-  /// open_counts, num_ambient, num_shadow  as shade_pixel()
   /// field_values [height * width] of the field; not read unless colours are by it
   /// picture      [width / samples][num_channels()]
   void (*shade)(const FrameParams &frame, const Shading &shading, uint samples, uint row,
-                const HitRecord *hits, const uchar *open_counts, uint num_ambient, uint num_shadow,
-                const float *field_values, std::uint8_t *picture);
+                const HitRecord *hits, const LightOfHits &light, const float *field_values,
+                std::uint8_t *picture);
   /// Blends a tile's hits on surfaces with those behind them, eight rays at a time if the processor
   /// can.
   ///

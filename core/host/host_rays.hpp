@@ -151,14 +151,16 @@ enum class WalkEnd { kHit, kNoHit, kLeft };
 
 /// Walks from block to block of a macrocell, `block` the first.
 ///
+/// kTraceBlock  trace_block(), or a function of its own that calls it: it is long
 /// enter    by which the ray enters that block; Out: by which it leaves the macrocell
 /// Returns  kNoHit: its interval ends before that
+template <auto kTraceBlock = trace_block>
 inline WalkEnd walk_blocks(const FrameParams &frame, const HostField &field, LastPlanes last,
                            const Ray &ray, const GridWalk &macrocell, ulong mask, GridWalk block,
                            RayEvent *enter, HitRecord *hit) {
   for (;;) {
     if ((mask >> cell_in_block(&block) & 1u) != 0 &&
-        trace_block(frame, field, ray, block, *enter, last, hit))
+        kTraceBlock(frame, field, ray, block, *enter, last, hit))
       return WalkEnd::kHit;
     *enter = walk_exit(&block, &ray);
     if (passes_border(*enter, ray.end_t)) return WalkEnd::kNoHit;
@@ -170,7 +172,9 @@ inline WalkEnd walk_blocks(const FrameParams &frame, const HostField &field, Las
 /// Walks from macrocell to macrocell, `coarse` the first, in those with an active block from block
 /// to block, and in active blocks from cell to cell.
 ///
-/// enter  by which the ray enters that macrocell
+/// enter        by which the ray enters that macrocell
+/// kTraceBlock  as walk_blocks()
+template <auto kTraceBlock = trace_block>
 inline bool walk_macrocells(const FrameParams &frame, const HostField &field, const ActiveBox &box,
                             LastPlanes last, const Ray &ray, GridWalk coarse, RayEvent enter,
                             HitRecord *hit) {
@@ -181,8 +185,9 @@ inline bool walk_macrocells(const FrameParams &frame, const HostField &field, co
       enter = walk_exit(&coarse, &ray);
       if (passes_border(enter, ray.end_t)) return false;
     } else {
-      const WalkEnd end = walk_blocks(frame, field, last, ray, coarse, mask,
-                                      enter_macrocell(ray, coarse, enter, last), &enter, hit);
+      const WalkEnd end =
+          walk_blocks<kTraceBlock>(frame, field, last, ray, coarse, mask,
+                                   enter_macrocell(ray, coarse, enter, last), &enter, hit);
       if (end != WalkEnd::kLeft) return end == WalkEnd::kHit;
     }
     walk_step(&coarse, &ray, enter, kMacrocellVoxels, last);

@@ -86,7 +86,9 @@ HostRenderer::HostRenderer(const CompressedVolume &volume, const HostRendererOpt
   if (options.field != nullptr) {
     check_volume_info(options.field->info, "the field");
     checked_limit(volume, memory_limit_, 1, HostBlocks::bytes(options.field->info));
-    field_.emplace(*options.field, levels_.infos(), levels_.room(), num_threads_);
+    field_.emplace(*options.field, options.field == &volume, levels_.infos(), levels_.room(),
+                   num_threads_);
+    abilities_.field_labels = are_labels(*options.field);
     abilities_.field = true;
   }
   setup_ms_ = ms_since(begin_);
@@ -102,7 +104,7 @@ Abilities HostRenderer::abilities_of(const CompressedVolume &volume) {
   abilities.clipping = abilities.fewer_planes = abilities.bounds = abilities.given_rays =
       abilities.kept_picture = true;
   abilities.most_surfaces = ISO_MAX_SURFACES;
-  abilities.labels = true;
+  abilities.labels = abilities.bounce = true;
   return abilities;
 }
 
@@ -113,6 +115,7 @@ FrameStats HostRenderer::render(const FrameRequest &request) {
   const std::vector<FrameParams> frames = make_level_frames(levels_.infos(), request.camera, size,
                                                             request.isovalue, request.voxel_pixels);
   FrameStats stats;
+  if (request.field_values) field_->begin_frame(request);
   if (request.surfaces.empty()) {
     draw_one(request, frames, size, stats);
   } else {
@@ -197,8 +200,7 @@ void HostRenderer::draw_surfaces(const FrameRequest &request, const FrameParams 
                 .is_smooth = request.normals == Normals::kSmooth,
                 .clip = make_clip_params(info_, frame.view, request.camera, request.clip),
                 .slice_map = make_field_map({&info_, 1}, info_),
-                .field = has_field ? &*field_ : nullptr,
-                .field_on_caps = request.field_on_caps};
+                .field = has_field ? &*field_ : nullptr};
   const LightRays light_rays = light_rays_of(request);
   const std::vector<AmbientDirection> directions = make_light_directions(light_rays);
   by.rays = {make_ambient_params(info_, light_rays.num_ambient),
@@ -298,6 +300,10 @@ void HostRenderer::add_ambient(const FrameRequest &request, std::span<const Host
       make_ambient_params(levels_.infos()[stats.first_level], light_rays.num_ambient);
   const FrameParams &seen = drawing.front().frame;
   open_ = {{}, light_rays.num_ambient, light_rays.num_shadow};
+  if (light_rays.bounces) {
+    open_.bounced.assign(hits_.size(), 0.0f);
+    open_.num_bounced = light_rays.num_ambient;
+  }
   open_.counts.assign(hits_.size(), static_cast<uchar>(light_rays.num_ambient));
   if (light_rays.num_shadow != 0)
     open_.counts.resize(2 * hits_.size(), static_cast<uchar>(light_rays.num_shadow));
@@ -307,9 +313,9 @@ void HostRenderer::add_ambient(const FrameRequest &request, std::span<const Host
         for (uint level = 0; level < drawing.size(); ++level) {
           const float voxel = std::ldexp(1.0f, static_cast<int>(stats.first_level + level));
           const AmbientRays rays{params, directions.data(), light_rays.count(), &seen, level,
-                                 voxel};
+                                 voxel,  light_rays.bounces};
           host_loops().ambient(drawing[level], within(tile, seen.screen), rays, hits_.data(),
-                               open_.counts.data());
+                               open_.counts.data(), open_.bounced.data());
         }
       },
       [&](std::uint32_t) {
@@ -318,7 +324,26 @@ void HostRenderer::add_ambient(const FrameRequest &request, std::span<const Host
         ++stats.ambient.passes;
         return pass;
       });
+  if (light_rays.bounces && !stats.cancelled) filter_bounced(seen, params);
   stats.ambient.ms = ms_since(begin);
+}
+
+void HostRenderer::filter_bounced(const FrameParams &frame, const AmbientParams &params) {
+  const auto for_rows = [&](const auto &do_row) {
+    parallel_for(frame.view.height, num_threads_,
+                 [&](std::uint64_t row, std::uint32_t) { do_row(static_cast<uint>(row)); });
+  };
+  std::vector<GivenRay> places(hits_.size());
+  for_rows(
+      [&](uint row) { host_loops().place_hits(frame, params, row, hits_.data(), places.data()); });
+  std::vector<float> filtered(hits_.size());
+  for (uint step = 0; step < ISO_BOUNCE_STEPS; ++step) {
+    for_rows([&](uint row) {
+      host_loops().filter_bounced(frame.view, row, 1u << step, places.data(), open_.bounced.data(),
+                                  filtered.data());
+    });
+    open_.bounced.swap(filtered);
+  }
 }
 
 /// Calls draw(tile, is_alone), as HostBlocks::run() does, for the tiles of all of the frame's rays,
@@ -358,7 +383,7 @@ void HostRenderer::add_field_values(const FrameRequest &request, FrameStats &sta
         for (std::size_t y = tile.begin_y; y < tile.end_y; ++y) {
           const std::size_t first = y * frame_.view.width + tile.begin_x;
           (*field_)(std::span(hits_).subspan(first, tile.end_x - tile.begin_x),
-                    request.field_on_caps, field_values_.data() + first);
+                    field_values_.data() + first);
         }
       },
       [&](std::uint32_t) {
@@ -479,8 +504,7 @@ FrameArrays HostRenderer::fetch(const WantedArrays &wanted, const Appearance &ap
       std::uint8_t *const pixels = arrays.picture.data() + channels * size_.width * row;
       if (colors_.empty()) {
         host_loops().shade(frame_, shading, size_.samples, static_cast<uint>(row), hits_.data(),
-                           open_.counts.data(), open_.num_ambient, open_.num_shadow,
-                           field_values_.data(), pixels);
+                           open_.of_hits(), field_values_.data(), pixels);
       } else {
         host_loops().shade_layers(frame_, params, size_.samples, static_cast<uint>(row),
                                   colors_.data(), pixels);

@@ -101,6 +101,7 @@ class HostRenderer : public Renderer {
   void add_field_values(const FrameRequest &request, FrameStats &stats);
   void add_ambient(const FrameRequest &request, std::span<const HostLevel> drawing,
                    FrameStats &stats);
+  void filter_bounced(const FrameParams &frame, const AmbientParams &params);
   template <class Draw, class After>
   bool for_bands(const OnPass &on_pass, bool more_follows, Draw draw, After after);
 

@@ -64,6 +64,13 @@ std::string build_options(const DeviceInfo &device, Defines defines) {
   return options;
 }
 
+/// What to say of drivers that do not know the processor, such as PoCL 3.0 of PyPI on AMD's Zen 5.
+std::string_view age_trouble(std::string_view log) {
+  return log.find("unknown target CPU") == log.npos ? ""
+                                                    : "; this driver is older than the processor: "
+                                                      "install a newer one, or draw on the host";
+}
+
 cl::Program build_program(const cl::Context &context, const cl::Device &device,
                           const DeviceInfo &info, const ProgramKey &key) {
   const auto &[stem, defines] = key;
@@ -77,8 +84,8 @@ cl::Program build_program(const cl::Context &context, const cl::Device &device,
     for (const auto &[at, said] : error.getBuildLog())
       log += with_file_names(said, kernel_text(stem));
     const std::string message =
-        fmt::format("{}.cl does not build on '{}' with {}: {}: {}{}", stem, info.name, options,
-                    error_name(error.err()), first_error(log), cache_trouble());
+        fmt::format("{}.cl does not build on '{}' with {}: {}: {}{}{}", stem, info.name, options,
+                    error_name(error.err()), first_error(log), cache_trouble(), age_trouble(log));
     throw BuildError(message, std::move(log));
   } catch (const cl::Error &error) {
     throw Error("{}.cl does not build on '{}' with {}: {}: {}", stem, info.name, options,

@@ -123,7 +123,7 @@ void DeviceRenderer::light_layer(const FrameRequest &request, const ClipParams &
       ambient_->block(rays_);
     }
   }
-  if (!frame.stats.cancelled) (*ambient_)(rays_, num_rounds);
+  if (!frame.stats.cancelled) count_last_round(num_rounds, frame);
 }
 
 /// Behind the last layer that is drawn, hits are counted alone.

@@ -58,14 +58,18 @@ FrameStats DeviceRenderer::render(const FrameRequest &request) {
   const Uploads before = blocks_.uploads();
   const bool is_smooth = request.normals == Normals::kSmooth;
   const LightRays light_rays = light_rays_of(request);
-  Frame frame{request.on_pass,
-              light_rays.count() + (is_smooth ? 1 : 0) + (request.field_values ? 1 : 0)};
+  Frame frame{request.on_pass, light_rays.count() +
+                                   (light_rays.bounces ? light_rays.num_ambient : 0) +
+                                   (is_smooth ? 1 : 0) + (request.field_values ? 1 : 0)};
   begin_frame(request);
   frame.stats.first_level = blocks_.drawing.first;
   frame.stats.last_level = blocks_.drawing.end - 1;
-  if (light_rays.count() != 0)
-    ambient_->begin(blocks_.levels[blocks_.drawing.first].info, blocks_.drawing.first, light_rays,
+  if (light_rays.count() != 0) {
+    const VolumeInfo &info = blocks_.levels[blocks_.drawing.first].info;
+    ambient_->begin(info, blocks_.drawing.first, light_rays,
                     static_cast<std::uint32_t>(std::max<std::size_t>(request.surfaces.size(), 1)));
+    if (light_rays.bounces) bounce_->begin(info, blocks_.drawing.first, light_rays);
+  }
   if (request.surfaces.empty()) {
     draw_surface(request, frame);
   } else {
@@ -73,10 +77,7 @@ FrameStats DeviceRenderer::render(const FrameRequest &request) {
   }
   if (has_field_values_) run(*field_, frame);
   FrameStats &stats = frame.stats;
-  if (request.surfaces.empty() && light_rays.count() != 0) {
-    for (std::uint32_t round = 0; round < light_rays.count(); ++round) cast_round(round, frame);
-    if (!stats.cancelled) (*ambient_)(rays_, light_rays.count());
-  }
+  if (request.surfaces.empty() && light_rays.count() != 0) light_surface(light_rays, frame);
   blocks_.close(recycled_blocks(stats), stats.cancelled);
   rays_.frame = blocks_.levels[0].frame;  // for shading
   const Uploads after = blocks_.uploads();
@@ -138,11 +139,57 @@ void DeviceRenderer::run(Wave &wave, Frame &frame, Wave *next) {
   if (sum != nullptr) sum->ms += ms_since(begin);
 }
 
-/// Casts one ambient ray of each hit. Until the next round begins, the picture shows the rounds
-/// before this one.
+/// Casts the light rays of a surface's hits. Until a round begins, the picture shows the rounds
+/// before it.
+void DeviceRenderer::light_surface(const LightRays &light_rays, Frame &frame) {
+  for (std::uint32_t round = 0; round < light_rays.count(); ++round) {
+    cast_round(round, frame);
+    if (light_rays.bounces && round < light_rays.num_ambient) bounce_round(round, frame);
+  }
+  if (frame.stats.cancelled) return;
+  count_last_round(light_rays.count(), frame);
+  if (!light_rays.bounces) return;
+  {
+    const auto stage = device_.timer().stage("bounce");
+    bounce_->filter(rays_);
+  }
+  add_stage_times(frame.stats.ambient);
+}
+
+/// Counts the rays of the last round that have met nothing.
+void DeviceRenderer::count_last_round(std::uint32_t num_rounds, Frame &frame) {
+  {
+    const auto stage = device_.timer().stage("ambient");
+    (*ambient_)(rays_, num_rounds);
+  }
+  add_stage_times(frame.stats.ambient);
+}
+
+/// Adds the times of what was launched behind the last pass.
+void DeviceRenderer::add_stage_times(LaterPasses &passes) {
+  LaterPasses behind;
+  behind.stage_ms = device_.timer().collect();
+  passes += behind;
+}
+
+/// Casts one light ray of each hit.
 void DeviceRenderer::cast_round(std::uint32_t round, Frame &frame) {
   ambient_round_->set_round(round);
   run(*ambient_round_, frame);
+}
+
+/// Casts a ray towards the light from where each ambient ray of the round has met the surface.
+void DeviceRenderer::bounce_round(std::uint32_t round, Frame &frame) {
+  if (frame.stats.cancelled) return;
+  {
+    const auto stage = device_.timer().stage("bounce");
+    bounce_->go_to_light(rays_, round);
+  }
+  ambient_round_->set_round(round, true);
+  run(*ambient_round_, frame);
+  if (frame.stats.cancelled) return;
+  const auto stage = device_.timer().stage("bounce");
+  bounce_->add(rays_, round);
 }
 
 DeviceRenderer::DeviceRenderer(ocl::Device &device, const CompressedVolume &volume,
@@ -177,8 +224,10 @@ DeviceRenderer::DeviceRenderer(ocl::Device &device, const CompressedVolume &volu
     ambient_.emplace(device, rays_.num_rays, blocks_.levels.size() > 1, is_brick());
     ambient_round_.emplace(blocks_, rays_, *ambient_, *given_rays_);
   }
+  if (options_.with_bounce) bounce_.emplace(device, rays_.num_rays, blocks_.levels.size() > 1);
   if (options_.field != nullptr) {
-    field_.emplace(device, *options_.field, levels(), plan.field, options_.group_size, rays_);
+    field_.emplace(device, *options_.field, options_.field == &volume, levels(), plan.field,
+                   options_.group_size, rays_);
     blocks_.on_reset = [this] { field_->clear(); };
     field_->own_blocks()->on_reset = [this] { blocks_.clear(); };
   }
@@ -218,6 +267,11 @@ void DeviceRenderer::compile_kernels() {
     if (field_) waves.push_back(&*field_);
     if (ambient_round_) waves.push_back(&*ambient_round_);
     if (ambient_ && behind_ && num_levels == 1) ambient_->block(rays);
+    if (bounce_) {
+      bounce_->go_to_light(rays, 0);
+      bounce_->add(rays, 0);
+      bounce_->filter(rays);
+    }
     for (Wave *wave : waves) {
       wave->begin();
       for (int pass = 0; pass < 2; ++pass) wave->enqueue_pass();  // the first decodes nothing
@@ -243,11 +297,13 @@ Abilities DeviceRenderer::abilities_of(const RendererOptions &options) {
   abilities.fewer_planes = true;
   abilities.clipping = options.pipeline->has_clipping();
   abilities.field = options.field != nullptr;
+  abilities.field_labels = abilities.field && are_labels(*options.field);
   abilities.bounds = options.with_bounds;
   abilities.most_surfaces = options.max_surfaces;
   abilities.labels = options.with_labels;
   abilities.isosurfaces = !options.with_labels;
-  abilities.given_rays = options.with_given_rays;
+  abilities.given_rays = options.with_given_rays || options.with_bounce;
+  abilities.bounce = options.with_bounce;
   abilities.kept_picture = options.with_kept_picture;
   abilities.solver = options.solver;
   return abilities;
@@ -287,14 +343,12 @@ void DeviceRenderer::begin_frame(const FrameRequest &request) {
   finds_first_of_.reset();
   finds_behind_of_.reset();
   size_ = size;
-  rays_.num_ambient = rays_.num_shadow = 0;
+  rays_.num_ambient = rays_.num_shadow = rays_.num_bounced = 0;
   rays_.set_clip(make_clip_params(blocks_.levels[0].info, frames.front().view, request.camera,
                                   first.clipped ? request.clip : Clip{}));
   open_frame(std::move(frames), values, request.bound, RaySource::kCamera);
   has_field_values_ = request.field_values && request.surfaces.empty();  // layers blend them
-  if (field_)
-    field_->begin_frame(request.field_values, request.field_on_caps,
-                        mapped_surfaces(request.surfaces));
+  if (field_) field_->begin_frame(request);
 }
 
 /// Puts labels into the groups of surfaces. Costs time if they are not those of the last frame.
@@ -485,84 +539,11 @@ OpenCounts DeviceRenderer::open() const {
   if (open.num_ambient == 0 && open.num_shadow == 0) return open;
   open.counts.resize((open.num_shadow != 0 ? 2 : 1) * size_.num_rays());
   rays_.open_counts.read(open.counts);
+  if (rays_.num_bounced == 0) return open;
+  open.num_bounced = rays_.num_bounced;
+  open.bounced.resize(size_.num_rays());
+  rays_.bounced.read(open.bounced);
   return open;
-}
-
-std::vector<HitRecord> DeviceRenderer::placed_hits() {
-  std::vector<HitRecord> hits = this->hits();
-  const bool has_level_ids =
-      blocks_.level_frames->size() > 1 || blocks_.level_frames->front().place.begin_z != 0;
-  for (HitRecord &hit : hits) {
-    if (hit.t == std::numeric_limits<float>::infinity()) continue;
-    std::size_t level = 0;
-    while (has_level_ids &&
-           level_block_of(&(*blocks_.level_frames)[level], hit.block_id) == ISO_INVALID_ID)
-      ++level;
-    const FrameParams &frame = (*blocks_.level_frames)[level];
-    if (has_level_ids) hit.block_id = level_block_of(&frame, hit.block_id);
-    hit = placed_hit(&frame, static_cast<uint>(blocks_.drawing.first + level), hit);
-  }
-  return hits;
-}
-
-void DeviceRenderer::begin_ambient(const FrameRequest &request, std::vector<HitRecord> placed,
-                                   LevelRange levels) {
-  check_has_picture();
-  check_has_given();
-  if (!is_brick()) throw Error("only a brick's frames leave their ambient rays to others");
-  for (HitRecord &hit : placed) hit.cell -= static_cast<uint>(levels.first);
-  set_hits(placed);
-  // A ray stays in the level that has its hit, which this brick need not have drawn.
-  std::vector<FrameParams> frames =
-      make_level_frames(infos_of(blocks_.levels), request.camera, size_, request.isovalue, 0);
-  for (std::size_t level = 0; level < frames.size(); ++level) {
-    const bool may_have_rays = level >= levels.first && level < levels.end;
-    const View &view = frames[level].view;
-    frames[level].screen = {0, 0, view.width, view.height};  // hits are other bricks', too
-    frames[level].band = {.begin_t = 0,
-                          .end_t = may_have_rays ? std::numeric_limits<float>::infinity() : 0};
-  }
-  open_frame(std::move(frames), decoded_values(request), FieldBound::kNone, RaySource::kGiven);
-}
-
-std::vector<std::uint64_t> DeviceRenderer::blocked_rays(std::uint32_t round,
-                                                        const LightRays &light_rays,
-                                                        LaterPasses &stats) {
-  rays_.frame = blocks_.level_frames->front();
-  ambient_->begin(blocks_.levels[blocks_.drawing.first].info, blocks_.drawing.first, light_rays);
-  const OnPass never_stops;
-  Frame frame{never_stops, 1};
-  cast_round(round, frame);
-  const LaterPasses &passes = frame.stats.ambient;
-  rays_.frame = blocks_.levels[0].frame;  // for shading
-  std::vector<HitRecord> met(size_.num_rays());
-  rays_.given_hits.read(met);
-  const bool is_shadow = round >= light_rays.num_ambient;
-  std::vector<GivenRay> given(rays_.is_clipped() || is_shadow ? met.size() : 0);
-  if (!given.empty()) rays_.given.read(given);
-  std::vector<std::uint64_t> blocked((met.size() + 63) / 64);
-  for (std::size_t ray = 0; ray < met.size(); ++ray) {
-    bool meets = met[ray].t != std::numeric_limits<float>::infinity();
-    if (meets && rays_.is_clipped()) {
-      const float in_first = std::ldexp(1.0f, static_cast<int>(given[ray].level)),
-                  voxel = std::ldexp(in_first, static_cast<int>(blocks_.drawing.first));
-      const float t_scale = blocks_.level_frames->front().view.t_scale * in_first;
-      meets = !is_clipped(&rays_.clip_params(), given[ray], voxel, met[ray].t / t_scale);
-    }
-    if (is_shadow) meets |= !is_given(given[ray]);
-    blocked[ray / 64] |= std::uint64_t{meets} << ray % 64;
-  }
-  blocks_.close(passes.recycled_blocks, true);
-  stats += passes;
-  return blocked;
-}
-
-void DeviceRenderer::set_open(const OpenCounts &open) {
-  check_has_picture();
-  check_has_given();
-  rays_.open_counts.write(open.counts);
-  rays_.num_ambient = open.num_ambient;
-  rays_.num_shadow = open.num_shadow;
 }
 
 KeptPicture &DeviceRenderer::kept() {
@@ -586,7 +567,7 @@ void DeviceRenderer::enlarge_kept(const FrameRequest &request) {
   const ImageSize size = size_of(request, abilities());
   rays_.frame = make_frame_params(blocks_.levels[0].info, request.camera, size, request.isovalue);
   size_ = size;
-  rays_.num_ambient = rays_.num_shadow = 0;
+  rays_.num_ambient = rays_.num_shadow = rays_.num_bounced = 0;
   kept().show(rays_, true);
   device_.finish();
 }

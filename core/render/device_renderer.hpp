@@ -21,6 +21,7 @@
 #include "core/render/ray_waves.hpp"
 #include "core/render/renderer_options.hpp"
 #include "core/stages/ambient.hpp"
+#include "core/stages/bounce.hpp"
 #include "core/stages/kept_picture.hpp"
 #include "core/stages/layers.hpp"
 #include "core/stages/shade.hpp"
@@ -88,7 +89,8 @@ class DeviceRenderer : public Renderer {
   /// The picture of the hit buffer, RGBA in words, red in bits 0..7; A is 0 if no ray of a pixel
   /// hits.
   HostArray<std::uint32_t> shade_packed(const Appearance &appearance);
-  /// Counts of open ambient rays of the last frame's hits, for its finished rounds.
+  /// Counts of open ambient rays of the last frame's hits, for its finished rounds, and bounced
+  /// light.
   ///
   /// Throws  Error: no frame was drawn
   /// Waits   yes
@@ -165,7 +167,11 @@ class DeviceRenderer : public Renderer {
                                           float isovalue) const;
   std::vector<DecodedValues> decoded_values(const FrameRequest &request) const;
   PassStats stats_of(const PassCounts &counts, BlockStore &blocks);
+  void light_surface(const LightRays &light_rays, Frame &frame);
   void cast_round(std::uint32_t round, Frame &frame);
+  void bounce_round(std::uint32_t round, Frame &frame);
+  void count_last_round(std::uint32_t num_rounds, Frame &frame);
+  void add_stage_times(LaterPasses &passes);
   void draw_surface(const FrameRequest &request, Frame &frame);
   void choose_labels(const std::vector<SurfaceStyle> &surfaces);
   void draw_layers(const FrameRequest &request, Frame &frame);
@@ -220,6 +226,7 @@ class DeviceRenderer : public Renderer {
   std::optional<RaysWave> given_rays_;  ///< this and the next two: options_.with_given_rays
   std::optional<Ambient> ambient_;
   std::optional<AmbientRound> ambient_round_;
+  std::optional<Bounce> bounce_;    ///< options_.with_bounce
   std::optional<FieldWave> field_;  ///< options_.field
   Passes passes_;
   double setup_ms_ = 0;

@@ -17,25 +17,25 @@ DeviceStream make_stream(ocl::Device &device, const CompressedVolume &field,
 
 }  // namespace
 
-FieldWave::FieldWave(ocl::Device &device, const CompressedVolume &field,
+FieldWave::FieldWave(ocl::Device &device, const CompressedVolume &field, bool is_own,
                      std::span<const VolumeInfo> levels, const FieldPlan &plan,
                      std::uint32_t group_size, Wavefront &rays)
     : range_(known_range(field)),
+      is_own_(is_own),
       blocks_(device, field, make_stream(device, field, plan), plan.cache, group_size),
       grid_(make_grid_params(field.info)),
       map_(make_field_map(levels, field.info)),
-      values_(device, rays.num_rays, group_size, plan.cache.slot_type),
+      values_(device, rays.num_rays, group_size, plan.cache.slot_type, ISO_NUM_LABELS),
       rays_(rays) {
   blocks_.drawing = {0, 1};
   values_.set_map(map_);
 }
 
-void FieldWave::begin_frame(bool has_values, bool on_caps, uint surfaces) {
-  map_.caps_alone = on_caps ? 1 : 0;
-  map_.surfaces = surfaces;
-  values_.set_map(map_);
+void FieldWave::begin_frame(const FrameRequest &request) {
+  const FieldReading reading = reading_of(request, map_, is_own_);
+  values_.set_map(reading.map, reading.label_table);
   layers_ = nullptr;
-  if (has_values) rays_.field_values.fill(no_value());
+  if (request.field_values) rays_.field_values.fill(no_value());
   if (!blocks_.has_requests()) return;
   blocks_.cache.requested_bits.fill(0);
   blocks_.forget_requests();

@@ -17,18 +17,19 @@ class FieldWave : public Wave {
   /// Uploads the field, unless it stays on the host.
   ///
   /// field   must outlive the wave if it stays on the host
+  /// is_own  it is the volume that is drawn
   /// levels  of the volume that is drawn
   /// rays    must outlive the wave
   /// Throws  Error: not enough memory on the device
   /// Waits   yes
-  FieldWave(ocl::Device &device, const CompressedVolume &field, std::span<const VolumeInfo> levels,
-            const FieldPlan &plan, std::uint32_t group_size, Wavefront &rays);
+  FieldWave(ocl::Device &device, const CompressedVolume &field, bool is_own,
+            std::span<const VolumeInfo> levels, const FieldPlan &plan, std::uint32_t group_size,
+            Wavefront &rays);
 
   /// A frame begins, which has no values yet.
   ///
-  /// surfaces  FieldMap::surfaces
-  /// Waits     if a frame before was stopped, or had another map
-  void begin_frame(bool has_values, bool on_caps, uint surfaces);
+  /// Waits  if a frame before was stopped, or read something else of the field
+  void begin_frame(const FrameRequest &request);
   /// The next waves are of the hits of a further layer; null: of all rays. layers must outlive the
   /// wave.
   void set_layer(Layers *layers) { layers_ = layers; }
@@ -48,6 +49,7 @@ class FieldWave : public Wave {
 
  private:
   std::optional<std::array<float, 2>> range_;
+  bool is_own_;
   BlockStore blocks_;
   FrameParams grid_;
   FieldMap map_;

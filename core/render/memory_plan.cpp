@@ -9,6 +9,7 @@
 #include "core/base/error.hpp"
 #include "core/render/pass_readback.hpp"
 #include "core/stages/ambient.hpp"
+#include "core/stages/bounce.hpp"
 #include "core/stages/field_values.hpp"
 #include "core/stages/kept_picture.hpp"
 #include "core/stages/shade.hpp"
@@ -97,6 +98,7 @@ RendererLimits limits_of(const CompressedVolume &volume, const MemoryRequest &re
                .with_pairs = false,
                .num_levels = grids.size(),
                .with_given = request.with_given_rays,
+               .with_bounce = request.with_bounce,
                .with_field = request.with_field || request.max_surfaces != 0},
       .cache = BlockCache::limits_for(
           make_id_grid(grids), cache_slots, rays, request.sparse_table ? 4 : 2,
@@ -185,7 +187,7 @@ FieldPlan plan_field(const CompressedVolume &field, const MemoryRequest &request
                  MacrocellBuffers::sizes(macrocells).bytes() +
                  Macrocells::sizes(macrocells.num_macrocells, 1).bytes() +
                  Macrocells::setup_scratch_bytes(field.num_blocks()) +
-                 BlockCache::sizes(plan.cache).bytes() + FieldValues::sizes().bytes();
+                 BlockCache::sizes(plan.cache).bytes() + FieldValues::sizes(ISO_NUM_LABELS).bytes();
     return plan;
   };
   const bool may_be_on_device =
@@ -227,8 +229,9 @@ MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &requ
       .add(Shade::sizes(request.num_rays))
       .add(PassReadback::sizes());
   if (request.with_given_rays) plan.buffers.add(Ambient::sizes());
+  if (request.with_bounce) plan.buffers.add(Bounce::sizes());
   if (limits.layers.max_surfaces != 0)
-    plan.buffers.add(Layers::sizes(limits.layers)).add(FieldValues::sizes());
+    plan.buffers.add(Layers::sizes(limits.layers)).add(FieldValues::sizes(0));
   if (limits.kept_rays != 0) plan.buffers.add(KeptPicture::sizes(limits.kept_rays));
   return plan;
 }

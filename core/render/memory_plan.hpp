@@ -45,6 +45,7 @@ struct MemoryRequest {
   bool sparse_table = false;        ///< the cache's table has room, so that rays look up faster
   bool with_field = false;          ///< hits have values of a field
   bool with_labels = false;         ///< voxels are labels
+  bool with_bounce = false;         ///< ambient rays may bring light
 
   ByteTable bytes() const {
     return with_labels ? ByteTable::kGroups : with_bounds ? ByteTable::kBounds : ByteTable::kNone;

@@ -60,7 +60,6 @@ RendererOptions checked(RendererOptions options, const CompressedVolume &volume,
     leave_out(options.with_levels, "with_levels");
     leave_out(options.with_bounds, "with_bounds");
     leave_out(options.with_kept_picture, "with_time_budget");
-    leave_out(options.field != nullptr, "a field");
     if (options.max_surfaces == 0)
       throw Error("labels are drawn as surfaces: give with_surfaces, 1 to {}", ISO_MAX_SURFACES);
   }
@@ -77,6 +76,7 @@ RendererOptions checked(RendererOptions options, const CompressedVolume &volume,
   if (options.largest_stream_part == 0) {
     options.largest_stream_part = device.capabilities().largest_allocation;
   }
+  options.with_given_rays |= options.with_bounce;
   return options;
 }
 
@@ -125,7 +125,8 @@ MemoryPlan make_plan(const ocl::Device &device, const CompressedVolume &volume,
                               options.max_surfaces,
                               options.memory_budget == 0 && options.cache_slots == 0,
                               options.field != nullptr,
-                              options.with_labels};
+                              options.with_labels,
+                              options.with_bounce};
   std::uint64_t budget = options.memory_budget != 0 ? options.memory_budget
                                                     : device.capabilities().global_memory / 4 * 3;
   if (options.field != nullptr) {

@@ -43,6 +43,7 @@ struct RendererOptions {
   const CompressedVolume *field = nullptr;
   std::uint32_t field_slots = 0;  ///< of its cache, at least 8; 0: as many as frames need
   bool with_given_rays = false;   ///< frames may have ambient rays, and rays may be cast
+  bool with_bounce = false;       ///< the same, and ambient rays may bring light
   /// Frames are drawn for pictures: else the kernels of smooth normals and of shade() are built
   /// when they are needed.
   bool with_shading = true;

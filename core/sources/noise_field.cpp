@@ -84,9 +84,9 @@ class NoiseRows : public FieldRows {
   }
 
   void evaluate(std::uint32_t y, std::uint32_t z, std::span<double> row) const override {
-    thread_local std::vector<NoiseLine> lines;
-    thread_local std::vector<double> sums;  // of group b; the row has those of a
-    sums.assign(row.size(), 0.0);
+    // Not kept by a thread: glibc ends the process if there is no memory to note their destructors.
+    std::vector<NoiseLine> lines;
+    std::vector<double> sums(row.size());  // of group b; the row has those of a
     std::ranges::fill(row, noise_begin(shape_, y));
     for (std::size_t i = 0; i < octaves_.size(); ++i)
       octaves_[i].add(y, z, i < shape_.begin_b ? row : std::span(sums), lines);

@@ -5,16 +5,21 @@
 namespace isowave::core {
 
 FieldValues::FieldValues(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_size,
-                         SlotType slots)
+                         SlotType slots, std::uint32_t num_labels)
     : device_(device),
       range_of_hits_(
           ocl::Range::strided(num_pixels, group_size, device, 4).in_parts(num_pixels, device)),
-      map_(device, sizes()["map of a field"]),
-      range_(device, sizes()["range of field values"]),
+      map_(device, sizes(num_labels)["map of a field"]),
+      label_table_(device, sizes(num_labels)["labels of surfaces"]),
+      range_(device, sizes(num_labels)["range of field values"]),
       kernel_(device, with_slots(group_defines(group_size), slots)),
       range_kernel_(device, with_slots(group_defines(group_size), slots)) {}
 
-void FieldValues::set_map(const FieldMap &map) {
+void FieldValues::set_map(const FieldMap &map, const std::vector<uint> &label_table) {
+  if (map.labels == ISO_FIELD_OWN_LABELS && label_table != labels_on_device_) {
+    label_table_.write(label_table);
+    labels_on_device_ = label_table;
+  }
   if (map_on_device_ && std::memcmp(&*map_on_device_, &map, sizeof(map)) == 0) return;
   map_.write({&map, 1});
   map_on_device_ = map;
@@ -22,10 +27,11 @@ void FieldValues::set_map(const FieldMap &map) {
 
 void FieldValues::operator()(const FrameParams &frame, BlockCache &cache, Wavefront &rays,
                              bool begins) {
-  kernel_(range_of_hits_, frame, map_, range_of_hits_.parts, begins ? 1u : 0u, cache.table,
-          cache.values, rays.previous_counts, rays.counts, rays.next_counts, rays.active_ray_ids,
-          rays.next_active_ray_ids, rays.hits, rays.field_values, cache.slot_stamps,
-          cache.requested_bits, cache.request_block_ids, cache.capacity, cache.state);
+  kernel_(range_of_hits_, frame, map_, label_table_, range_of_hits_.parts, begins ? 1u : 0u,
+          cache.table, cache.values, rays.previous_counts, rays.counts, rays.next_counts,
+          rays.active_ray_ids, rays.next_active_ray_ids, rays.hits, rays.field_values,
+          cache.slot_stamps, cache.requested_bits, cache.request_block_ids, cache.capacity,
+          cache.state);
 }
 
 std::optional<std::array<float, 2>> FieldValues::range(const Wavefront &rays,

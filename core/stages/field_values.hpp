@@ -1,8 +1,10 @@
 #pragma once
 // Hits get the values of a second volume, the field (kernels_cl/field_values.cl).
 
+#include <algorithm>
 #include <array>
 #include <optional>
+#include <vector>
 
 #include "core/stages/block_cache.hpp"
 #include "core/stages/wavefront.hpp"
@@ -13,17 +15,22 @@ namespace isowave::core {
 
 class FieldValues {
  public:
-  static ocl::BufferSizes sizes() {
+  /// num_labels  ISO_NUM_LABELS, if the map may have ISO_FIELD_OWN_LABELS; else 0
+  static ocl::BufferSizes sizes(std::uint32_t num_labels) {
     return {ocl::buffer_size<FieldMap>("map of a field", 1),
+            ocl::buffer_size<uint>("labels of surfaces", std::max(1u, num_labels / 4)),
             ocl::buffer_size<uint>("range of field values", 2)};
   }
 
-  /// slots: of the field's cache.
+  /// slots       of the field's cache
+  /// num_labels  as sizes()
   FieldValues(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_size,
-              SlotType slots);
+              SlotType slots, std::uint32_t num_labels = 0);
 
   /// Sets the map from hits to the field. Waits, if it is another one than before.
-  void set_map(const FieldMap &map);
+  ///
+  /// label_table  FieldReading::label_table
+  void set_map(const FieldMap &map, const std::vector<uint> &label_table = {});
 
   /// The hits whose blocks of the field are cached get their values; rays of the others ask for
   /// blocks, as far as they are in the pass's window.
@@ -48,7 +55,9 @@ class FieldValues {
   ocl::Device &device_;
   ocl::Range range_of_hits_;
   std::optional<FieldMap> map_on_device_{};
+  std::vector<uint> labels_on_device_{};
   ocl::Buffer<FieldMap> map_;
+  ocl::Buffer<uint> label_table_;
   ocl::Buffer<uint> range_;
   ocl::Kernel<kernels::field_values> kernel_;
   ocl::Kernel<kernels::field_range> range_kernel_;

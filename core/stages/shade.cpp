@@ -46,7 +46,7 @@ void Shade::compile(Wavefront &rays) {
       return ocl::Range::strided(items, ocl::kGroupSize, device_);
     };
     shade_(range(num_items(num_pixels)), FrameParams{}, ShadeParams{}, color_map_, 1, rays.hits,
-           rays.open_counts, 0u, 0u, rays.field_values, 0u, staging_);
+           rays.open_counts, 0u, 0u, rays.bounced, 0u, rays.field_values, 0u, staging_);
     depths_(range(num_pixels), 0u, 0u, rays.hits, staging_);
     normals_(range(num_pixels / 3 + 1), ShadeParams{}, 0u, 0u, rays.hits, staging_);
   }
@@ -71,7 +71,8 @@ void Shade::shade(const Shading &shading, Wavefront &rays, const ocl::Buffer<Ray
     shade_layers_(range, rays.frame, params, samples, *layers, with_alpha, staging_);
   } else {
     shade_(range, rays.frame, params, color_map_, samples, rays.hits, rays.open_counts,
-           rays.num_ambient, rays.num_shadow, rays.field_values, with_alpha, staging_);
+           rays.num_ambient, rays.num_shadow, rays.bounced, rays.num_bounced, rays.field_values,
+           with_alpha, staging_);
   }
   staging_.read_async(std::as_writable_bytes(std::span(image.data(), image.size())), copied_);
 }

@@ -6,7 +6,7 @@ namespace isowave::core {
 
 ocl::BufferSizes Wavefront::sizes(const Limits &limits) {
   const std::uint64_t rays = limits.num_rays, pairs = limits.with_pairs ? rays : 0,
-                      given = limits.with_given ? rays : 0,
+                      given = limits.with_given ? rays : 0, bounced = limits.with_bounce ? rays : 0,
                       scanned = limits.scanned_pairs ? rays : 0,
                       walks = limits.with_walks ? rays : 0;
   return {ocl::buffer_size<PassCounts>("pass counts", 1),
@@ -18,6 +18,8 @@ ocl::BufferSizes Wavefront::sizes(const Limits &limits) {
           ocl::buffer_size<GivenRay>("given rays", given),
           ocl::buffer_size<HitRecord>("hits of given rays", given),
           ocl::buffer_size<uchar>("open ambient rays", 2 * given),
+          ocl::buffer_size<float>("bounced light", bounced),
+          ocl::buffer_size<float>("bounced light, next", bounced),
           ocl::buffer_size<float>("field values", limits.with_field ? rays : 0),
           ocl::buffer_size<uint>("ray states", walks),
           ocl::buffer_size<uint>("active ray ids", walks),
@@ -44,6 +46,8 @@ Wavefront::Wavefront(ocl::Device &device, std::uint64_t rays, const ocl::BufferS
       given(device, sizes["given rays"]),
       given_hits(device, sizes["hits of given rays"]),
       open_counts(device, sizes["open ambient rays"]),
+      bounced(device, sizes["bounced light"]),
+      bounced_next(device, sizes["bounced light, next"]),
       field_values(device, sizes["field values"]),
       ray_block_ids(device, sizes["ray states"]),
       active_ray_ids(device, sizes["active ray ids"]),

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 
 #include "core/base/error.hpp"
@@ -99,8 +100,26 @@ constexpr std::string_view kCoolwarm =
     "cc4039cb3e38ca3b37c83936c73634c63433c43132c32e31c12b30c0282fbf252ebd222cbc1e2bba1a2a"
     "b91629b71128b60b27b40426";
 
-constexpr std::string_view kNames[] = {"viridis", "magma", "cividis", "coolwarm", "gray"};
+constexpr std::string_view kNames[] = {"viridis", "magma", "cividis", "coolwarm", "gray", "labels"};
 constexpr std::string_view kTables[] = {kViridis, kMagma, kCividis, kCoolwarm};
+
+/// Colours for labels: hues by the golden ratio, so that any few in a row are far apart, in turns
+/// light and dark, full and pale.
+std::uint32_t label_color(std::uint32_t label) {
+  constexpr double kGoldenRatio = 0.6180339887498949;
+  constexpr double kValues[] = {0.92, 0.72, 0.85}, kSaturations[] = {0.6, 0.75, 0.45};
+  const double hue = 6 * (label * kGoldenRatio - static_cast<std::uint32_t>(label * kGoldenRatio));
+  const double value = kValues[label % 3], saturation = kSaturations[label / 3 % 3];
+  std::uint32_t color = 0;
+  for (std::uint32_t channel = 0; channel < 3; ++channel) {
+    // Full at its own hue and a sixth of the circle around it, and none half a circle away.
+    const double turn = std::fmod(hue + 6 - 2 * channel, 6);
+    const double share = std::clamp(2 - std::min(turn, 6 - turn), 0.0, 1.0);
+    const double light = value * (1 - saturation * (1 - share));
+    color |= static_cast<std::uint32_t>(std::lround(255 * light)) << 8 * channel;
+  }
+  return color;
+}
 
 std::uint32_t digit(char c) {
   return static_cast<std::uint32_t>(c <= '9' ? c - '0' : c - 'a' + 10);
@@ -119,7 +138,11 @@ std::array<std::uint32_t, 256> color_map(std::string_view name) {
   const auto number = static_cast<std::size_t>(found - std::begin(kNames));
   std::array<std::uint32_t, 256> colors{};
   for (std::uint32_t i = 0; i < colors.size(); ++i) {
-    if (number == std::size(kTables)) {  // gray
+    if (name == "labels") {
+      colors[i] = label_color(i);
+      continue;
+    }
+    if (name == "gray") {
       colors[i] = i * 0x010101u;
       continue;
     }

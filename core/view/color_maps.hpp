@@ -8,7 +8,8 @@
 
 namespace isowave::core {
 
-/// Names of the colour maps: viridis, magma, cividis, coolwarm, gray.
+/// Names of the colour maps: viridis, magma, cividis, coolwarm, gray; and labels, whose
+/// hues go round by the golden ratio.
 std::span<const std::string_view> color_map_names();
 
 /// Colours from low to high: words, red in bits 0..7, green 8..15, blue 16..23.

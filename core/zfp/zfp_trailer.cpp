@@ -8,6 +8,7 @@
 #include <type_traits>
 
 #include "core/base/error.hpp"
+#include "core/io/json_list.hpp"
 #include "kernels_cl/portable/block_bound.h"
 
 namespace isowave::core {
@@ -131,12 +132,12 @@ std::uint32_t json_crc(std::string_view text, const ZfpFooter &footer) {
 
 std::string zfp_trailer_text(const CompressedVolume &volume, const ZfpLayout &layout) {
   const VolumeInfo &info = volume.info;
-  json trailer;
+  json trailer = json::object();
   trailer["spacing"] = {info.spacing.x, info.spacing.y, info.spacing.z};
   trailer["origin"] = {info.origin.x, info.origin.y, info.origin.z};
   for (int column = 0; column < 3; ++column) {
-    trailer["direction"].push_back(
-        {info.direction[column].x, info.direction[column].y, info.direction[column].z});
+    const glm::dvec3 axis = info.direction[column];
+    add_to_list<json>(trailer, "direction", {axis.x, axis.y, axis.z});
   }
   trailer["type"] = to_string(info.type);
   if (std::isfinite(volume.value_range[0])) trailer["value_range"] = volume.value_range;

@@ -118,6 +118,29 @@ ISO_INLINE HitRecord placed_hit(const FrameParams *of_level, uint level, HitReco
   return hit;
 }
 
+/// A ray that begins above a hit.
+///
+/// placed  see placed_hit()
+/// normal  of the hit, on the side of the ray, world space, of length 1
+/// d       direction, world space
+ISO_INLINE GivenRay ray_above(const AmbientParams *p, HitRecord placed, AmbientDirection normal,
+                              AmbientDirection d) {
+  const AmbientDirection up = normalized(turned(p->to_index, normal.x, normal.y, normal.z));
+  GivenRay given;
+  float scale = 1.0f;
+  uint i;
+  d = turned(p->to_index, d.x, d.y, d.z);
+  for (i = 0; i < placed.cell; ++i) scale *= 0.5f;
+  given.o_x = fma(up.x, ISO_AMBIENT_LIFT, placed.x);
+  given.o_y = fma(up.y, ISO_AMBIENT_LIFT, placed.y);
+  given.o_z = fma(up.z, ISO_AMBIENT_LIFT, placed.z);
+  given.d_x = d.x * scale;
+  given.d_y = d.y * scale;
+  given.d_z = d.z * scale;
+  given.level = placed.cell;
+  return given;
+}
+
 /// Is a hit's ray of that number a shadow ray?
 ISO_INLINE int is_shadow_ray(const AmbientParams *p, uint number) {
   return number >= p->num_ambient;
@@ -133,24 +156,10 @@ ISO_INLINE int is_shadow_ray(const AmbientParams *p, uint number) {
 ISO_INLINE GivenRay ambient_ray(const FrameParams *frame, const AmbientParams *p, HitRecord placed,
                                 uint pixel, uint number, AmbientDirection direction) {
   const Ray ray = make_ray(frame, pixel);
-  GivenRay given;
-  AmbientDirection normal, up, d;
-  float scale = 1.0f;
-  uint i;
-  normal = seen_normal(p, &ray, placed);
-  up = normalized(turned(p->to_index, normal.x, normal.y, normal.z));
-  if (is_shadow_ray(p, number) && !(inner_product(normal, direction) > 0.0f)) return no_ray();
-  d = is_shadow_ray(p, number) ? direction : around(normal, direction);
-  d = turned(p->to_index, d.x, d.y, d.z);
-  for (i = 0; i < placed.cell; ++i) scale *= 0.5f;
-  given.o_x = fma(up.x, ISO_AMBIENT_LIFT, placed.x);
-  given.o_y = fma(up.y, ISO_AMBIENT_LIFT, placed.y);
-  given.o_z = fma(up.z, ISO_AMBIENT_LIFT, placed.z);
-  given.d_x = d.x * scale;
-  given.d_y = d.y * scale;
-  given.d_z = d.z * scale;
-  given.level = placed.cell;
-  return given;
+  const AmbientDirection normal = seen_normal(p, &ray, placed);
+  const int is_shadow = is_shadow_ray(p, number);
+  if (is_shadow && !(inner_product(normal, direction) > 0.0f)) return no_ray();
+  return ray_above(p, placed, normal, is_shadow ? direction : around(normal, direction));
 }
 
 ISO_NAMESPACE_END

@@ -1,11 +1,13 @@
 /// field_value.h -- the value of another volume, the field, at a hit: trilinear between the eight
-/// voxels around it. Portable: OpenCL C 1.2 and C++.
+/// voxels around it; or if the field's values are labels, the label of the nearest of these voxels,
+/// by the rules of nearest_label(). Portable: OpenCL C 1.2 and C++.
 ///
 /// Hits outside the field's grid, or in a cell with a corner without data, have no value: NaN.
 #ifndef ISOWAVE_FIELD_VALUE_H
 #define ISOWAVE_FIELD_VALUE_H
 
 #include "cell_intersect.h"
+#include "label_table.h"
 #include "no_data.h"
 #include "smooth_gradient.h"
 
@@ -16,6 +18,10 @@ ISO_NAMESPACE_BEGIN
 /// be rounded to one side or the other.
 #define ISO_FIELD_REACH 0.00390625f
 
+#define ISO_FIELD_NUMBERS 0u     ///< trilinear
+#define ISO_FIELD_LABELS 1u      ///< of the nearest voxel with a label other than 0
+#define ISO_FIELD_OWN_LABELS 2u  ///< of the nearest voxel with a label of the hit's surface
+
 /// From a hit's cell to the index space of the field.
 typedef struct FieldMap {
   float rows[12];                  ///< row-major 3 x 4, from the finest level's index space
@@ -24,9 +30,10 @@ typedef struct FieldMap {
   uint num_levels;                 ///< levels that may have hits
   uint caps_alone;                 ///< 0 or 1: hits that are no caps have no value
   uint surfaces;                   ///< bit i: hits of the surface or slice of number i have values
+  uint labels;                     ///< ISO_FIELD_*: what the field's values are
   uint begin_z[ISO_FIELD_LEVELS];  ///< see LevelPlace
 } FieldMap;
-ISO_CHECK_SIZE(FieldMap, 144);
+ISO_CHECK_SIZE(FieldMap, 148);
 
 /// The place of a hit in the field.
 typedef struct FieldPlace {
@@ -127,6 +134,39 @@ ISO_INLINE float field_value(const float *v, CellPoint at) {
   if (lacks_data(v)) return no_value();
   return without_zero_sign(lerp(at.z, lerp(at.y, lerp(at.x, v[0], v[1]), lerp(at.x, v[2], v[3])),
                                 lerp(at.y, lerp(at.x, v[4], v[5]), lerp(at.x, v[6], v[7]))));
+}
+
+/// The label at a hit: that of the nearest of the cell's corners, of several the first. Corners of
+/// the background, label 0, do not count, unless the hit is on a surface of it.
+///
+/// v            [8]: the cell's corners, x + 2y + 4z
+/// label_table  see groups_of_label(); not read unless m->labels is ISO_FIELD_OWN_LABELS
+ISO_INLINE float nearest_label(ISO_GLOBAL const FieldMap *m, ISO_GLOBAL const uint *label_table,
+                               HitRecord hit, const float *v, CellPoint at) {
+  const uint surface = hit.cell >> ISO_SURFACE_BIT;
+  float label = no_value(), least = 4.0f; /* squared distances are 3 at most [voxels] */
+  int corner;
+  if (lacks_data(v)) return label;
+  for (corner = 0; corner < 8; ++corner) {
+    const float x = corner & 1 ? 1.0f - at.x : at.x, y = corner & 2 ? 1.0f - at.y : at.y,
+                z = corner & 4 ? 1.0f - at.z : at.z;
+    const float distance = fma(x, x, fma(y, y, z * z));
+    if (distance < least && is_label(v[corner]) &&
+        (m->labels == ISO_FIELD_OWN_LABELS
+             ? (groups_of_label(label_table, v[corner]) >> surface & 1u) != 0
+             : v[corner] != 0.0f)) {
+      label = v[corner];
+      least = distance;
+    }
+  }
+  return label;
+}
+
+/// What a hit shows of the field. Arguments as nearest_label().
+ISO_INLINE float value_of_hit(ISO_GLOBAL const FieldMap *m, ISO_GLOBAL const uint *label_table,
+                              HitRecord hit, const float *v, CellPoint at) {
+  return m->labels == ISO_FIELD_NUMBERS ? field_value(v, at)
+                                        : nearest_label(m, label_table, hit, v, at);
 }
 
 ISO_NAMESPACE_END

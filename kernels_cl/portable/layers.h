@@ -149,7 +149,7 @@ ISO_INLINE int is_unseen(ISO_GLOBAL const LayerParams *layers, HitRecord hit, fl
 ISO_INLINE int has_value_color(const ShadeParams *p, ISO_GLOBAL const LayerParams *layers,
                                HitRecord hit) {
   return is_of_slice(layers, hit) ||
-         (p->has_map == ISO_MAP_BY_FIELD && (layers->unmapped >> surface_of(hit) & 1u) == 0);
+         (has_field_colors(p) && (layers->unmapped >> surface_of(hit) & 1u) == 0);
 }
 
 /// Blends a ray's next hit behind what it has seen.
@@ -174,7 +174,7 @@ ISO_INLINE RayColor blend_hit(const FrameParams *frame, const ShadeParams *p,
     color.b = surface->b;
     if ((layers->unmapped >> surface_of(hit) & 1u) == 0)
       color = surface_color(frame, p, color_map, ray_id, hit.t, value, color);
-    color = shade_ray(frame, p, color, ray_id, hit.grad_x, hit.grad_y, hit.grad_z, open, lit);
+    color = shade_ray(frame, p, color, ray_id, hit.grad_x, hit.grad_y, hit.grad_z, open, lit, 0.0f);
   }
   share = seen.transmittance * surface->opacity;
   seen.r = fma(share, color.r, seen.r);

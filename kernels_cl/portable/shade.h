@@ -12,6 +12,7 @@
 #define ISOWAVE_SHADE_H
 
 #include "ambient.h"
+#include "label_table.h"
 
 ISO_NAMESPACE_BEGIN
 
@@ -38,6 +39,12 @@ ISO_CHECK_SIZE(ShadeParams, 172);
 
 #define ISO_MAP_BY_AXIS 1u
 #define ISO_MAP_BY_FIELD 2u
+#define ISO_MAP_BY_LABEL 3u  ///< labels of a field: that of label L is entry L % ISO_MAP_COLORS
+
+/// Are colours by the value of a field at the hit?
+ISO_INLINE int has_field_colors(const ShadeParams *p) {
+  return p->has_map == ISO_MAP_BY_FIELD || p->has_map == ISO_MAP_BY_LABEL;
+}
 
 #define ISO_MAP_COLORS 256u  ///< of a colour map: words, red in bits 0..7, green 8..15, blue 16..23
 
@@ -88,25 +95,33 @@ ISO_INLINE Color background_color(const ShadeParams *p, uint row, uint height, u
                     fma(up, p->rise_b, p->background_b));
 }
 
-/// The colour of a map [ISO_MAP_COLORS] at a place: 0 is its first colour, 1 its last.
-ISO_INLINE Color map_color(ISO_GLOBAL const uint *color_map, float at) {
-  uint word;
-  at = at > 0.0f ? (at < 1.0f ? at : 1.0f) : 0.0f; /* 0 also if it is not a number */
-  word = color_map[(uint)fma(at, (float)(ISO_MAP_COLORS - 1u), 0.5f)];
+ISO_INLINE Color color_of_word(uint word) {
   return make_color((float)(word & 255u) / 255.0f, (float)(word >> 8 & 255u) / 255.0f,
                     (float)(word >> 16 & 255u) / 255.0f);
+}
+
+/// The colour of a map [ISO_MAP_COLORS] at a place: 0 is its first colour, 1 its last.
+ISO_INLINE Color map_color(ISO_GLOBAL const uint *color_map, float at) {
+  at = at > 0.0f ? (at < 1.0f ? at : 1.0f) : 0.0f; /* 0 also if it is not a number */
+  return color_of_word(color_map[(uint)fma(at, (float)(ISO_MAP_COLORS - 1u), 0.5f)]);
 }
 
 /// The colour of the surface that a ray hits at t: its own, or the colour map's.
 ///
 /// color_map  [ISO_MAP_COLORS]; not read without one
-/// value      of the field at the hit; NaN: there is none, and the surface has its own colour
+/// value      of the field at the hit; NaN, or no label if it should be one: the surface has its
+/// own
+///            colour
 ISO_INLINE Color surface_color(const FrameParams *frame, const ShadeParams *p,
                                ISO_GLOBAL const uint *color_map, uint ray_id, float t, float value,
                                Color own) {
   Ray ray;
   float along, at;
   if (!p->has_map) return own;
+  if (p->has_map == ISO_MAP_BY_LABEL) {
+    if (!is_label(value)) return own;
+    return color_of_word(color_map[(uint)value % ISO_MAP_COLORS]);
+  }
   if (p->has_map == ISO_MAP_BY_FIELD) {
     if (value != value) return own;
     at = (value - p->field_low) * p->field_scale;
@@ -122,9 +137,11 @@ ISO_INLINE Color surface_color(const FrameParams *frame, const ShadeParams *p,
 
 /// The colour of a ray that hits a surface of that colour. open: the share of the sky that
 /// the hit sees, [0,1]; the same share of all lights but the headlight and the scene's gets there.
-/// lit: the share of the scene's light that gets there.
+/// lit: the share of the scene's light that gets there. bounced: the share of it that comes by way
+/// of another place of a surface of the same colour.
 ISO_INLINE Color shade_ray(const FrameParams *frame, const ShadeParams *p, Color surface,
-                           uint ray_id, float gx, float gy, float gz, float open, float lit) {
+                           uint ray_id, float gx, float gy, float gz, float open, float lit,
+                           float bounced) {
   Ray ray;
   float nx, ny, nz, vx, vy, vz, ux, uy, uz, n, lengths, cosine, facing, slope, highlight, light;
   float largest = fabs(gx) > fabs(gy) ? fabs(gx) : fabs(gy);
@@ -169,9 +186,22 @@ ISO_INLINE Color shade_ray(const FrameParams *frame, const ShadeParams *p, Color
   light = fma(p->diffuse, cosine, open * p->ambient);
   if (slope > 0.0f) light = fma((p->has_light ? lit : open) * p->above, slope, light);
   highlight *= p->specular;
-  return make_color(fma(surface.r, light, highlight), fma(surface.g, light, highlight),
-                    fma(surface.b, light, highlight));
+  bounced *= p->above;
+  return make_color(fma(surface.r, fma(surface.r, bounced, light), highlight),
+                    fma(surface.g, fma(surface.g, bounced, light), highlight),
+                    fma(surface.b, fma(surface.b, bounced, light), highlight));
 }
+
+/// What the light rays of hits have found, for shading.
+typedef struct LightOfHits {
+  /// [2][ray] ambient rays of its hit, and shadow rays, that met nothing (ambient.h)
+  ISO_GLOBAL const uchar *open_counts;
+  uint num_ambient;  ///< ambient rays of a hit; 0: there are none, and all is open
+  uint num_shadow;   ///< shadow rays of a hit; 0: there are none, and all is lit
+  /// [ray] sums of the light that ambient rays bring from the surface (bounce.h)
+  ISO_GLOBAL const float *bounced;
+  uint num_bounced;  ///< rays in a sum; 0: there are none
+} LightOfHits;
 
 /// The share of a hit's light rays that met nothing.
 ///
@@ -180,20 +210,22 @@ ISO_INLINE float open_share(ISO_GLOBAL const uchar *open_counts, uint place, uin
   return num_rays == 0 ? 1.0f : (float)open_counts[place] / (float)num_rays;
 }
 
+/// The share of the scene's light that comes to a ray's hit by way of another place.
+ISO_INLINE float bounced_share(const LightOfHits *light, uint ray_id) {
+  return light->num_bounced == 0 ? 0.0f : light->bounced[ray_id] / (float)light->num_bounced;
+}
+
 /// RGBA of the pixel at a column and row of the picture, 8 bits each, red in bits 0..7. The pixel
 /// has samples times samples rays of the frame. If pictures are transparent, the colour is the mean
 /// of the rays that hit, and A is their share of all rays (straight alpha); 0 0 0 0 if none hits.
 /// Otherwise the colour is the mean of all rays, and A is 255 if any of them hits, else 0.
 ///
 /// color_map    as surface_color()
-/// open_counts  [2][ray] ambient rays of its hit, and shadow rays, that met nothing (ambient.h)
-/// num_ambient  ambient rays of a hit; 0: there are none, and all is open
-/// num_shadow   shadow rays of a hit; 0: there are none, and all is lit
 /// values       [ray] of the field; not read unless colours are by it
 ISO_INLINE uint shade_pixel(const FrameParams *frame, const ShadeParams *p,
                             ISO_GLOBAL const uint *color_map, uint samples, uint column, uint row,
-                            ISO_GLOBAL const HitRecord *hits, ISO_GLOBAL const uchar *open_counts,
-                            uint num_ambient, uint num_shadow, ISO_GLOBAL const float *values) {
+                            ISO_GLOBAL const HitRecord *hits, const LightOfHits *light,
+                            ISO_GLOBAL const float *values) {
   const uint num_rays = samples * samples, frame_rays = frame->view.width * frame->view.height;
   const uint first_ray = row * samples * frame->view.width + column * samples;
   float r = 0.0f, g = 0.0f, b = 0.0f, share;
@@ -209,12 +241,13 @@ ISO_INLINE uint shade_pixel(const FrameParams *frame, const ShadeParams *p,
     const uint ray_id = first_ray + i / samples * frame->view.width + i % samples;
     Color color = behind;
     if (hits[ray_id].t != INFINITY) {
-      const float value = p->has_map == ISO_MAP_BY_FIELD ? values[ray_id] : 0.0f;
+      const float value = has_field_colors(p) ? values[ray_id] : 0.0f;
       color = shade_ray(frame, p,
                         surface_color(frame, p, color_map, ray_id, hits[ray_id].t, value, own),
                         ray_id, hits[ray_id].grad_x, hits[ray_id].grad_y, hits[ray_id].grad_z,
-                        open_share(open_counts, ray_id, num_ambient),
-                        open_share(open_counts, frame_rays + ray_id, num_shadow));
+                        open_share(light->open_counts, ray_id, light->num_ambient),
+                        open_share(light->open_counts, frame_rays + ray_id, light->num_shadow),
+                        bounced_share(light, ray_id));
       ++num_hits;
     }
     r += color.r;

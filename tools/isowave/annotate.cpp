@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "core/base/error.hpp"
+#include "core/base/utf8.hpp"
 #include "tools/isowave/strict_options.hpp"
 
 namespace isowave::core::tools {
@@ -20,49 +21,79 @@ void add_annotation_options(CLI::App &command, AnnotationOptions &options) {
   command
       .add_option("--annotate", options.wanted,
                   "draws over --output and --refined, separated by commas: scale-bar, axes, "
-                  "color-bar, caption (the volume's name, isovalues); or all")
+                  "color-bar, caption (the volume's name, isovalues); or all, or none [those of "
+                  "--scene]")
       ->type_name("LIST");
   command
       .add_option("--units", options.units,
-                  "units of the world for the scale bar and colours along an axis, such as mm")
-      ->type_name("TEXT")
-      ->needs("--annotate");
+                  "units of the world for the scale bar and colours along an axis, such as mm "
+                  "[those of --scene]")
+      ->type_name("TEXT");
 }
 
-std::optional<isowave::Annotations> read_annotations(const AnnotationOptions &options,
-                                                     const isowave::Appearance &appearance,
-                                                     const std::string &title) {
-  if (options.wanted.empty()) return std::nullopt;
-#ifndef ISOWAVE_HAS_CAIRO
-  throw Error("--annotate: this isowave was built without Cairo: leave it out");
-#endif
-  constexpr std::size_t kLongestUnits = 16;
-  if (options.units.size() > kLongestUnits)
-    throw Error("--units {}: give at most {} bytes", options.units, kLongestUnits);
-  const bool has_map = !appearance.color_map.empty() || !appearance.color_table.empty();
-  isowave::Annotations wanted{.units = options.units, .title = title};
-  for (const std::string_view name : split_at_commas(options.wanted)) {
+namespace {
+
+/// Sets which annotations are drawn.
+///
+/// list  names with commas, or "all"
+void choose_annotations(const std::string &list, const isowave::Appearance &appearance,
+                        bool has_slices, isowave::Annotations &wanted) {
+  wanted.scale_bar = wanted.axes = wanted.color_bar = wanted.caption = false;
+  const bool has_map = !appearance.color_map.empty() || !appearance.color_table.empty(),
+             has_bar = (has_map && !appearance.color_by_label) || has_slices;
+  for (const std::string_view name : split_at_commas(list)) {
     const bool is_all = name == "all";
-    if (name == "color-bar" && !has_map)
+    if (name == "color-bar" && appearance.color_by_label && !has_bar)
+      throw Error("--annotate color-bar: colours of labels have no order: leave it out");
+    if (name == "color-bar" && !has_bar)
       throw Error("--annotate color-bar: no colour map is drawn: give --color-by");
     if (!is_all && name != "scale-bar" && name != "axes" && name != "color-bar" &&
         name != "caption")
-      throw Error("--annotate {}: there are scale-bar, axes, color-bar, caption, and all", name);
+      throw Error(
+          "--annotate {}: there are scale-bar, axes, color-bar, caption, and all; or give none "
+          "alone",
+          name);
     wanted.scale_bar |= is_all || name == "scale-bar";
     wanted.axes |= is_all || name == "axes";
-    wanted.color_bar |= name == "color-bar" || (is_all && has_map);
+    wanted.color_bar |= name == "color-bar" || (is_all && has_bar);
     wanted.caption |= is_all || name == "caption";
   }
+}
+
+}  // namespace
+
+std::optional<isowave::Annotations> read_annotations(
+    const AnnotationOptions &options, const std::optional<isowave::Annotations> &of_scene,
+    const isowave::Appearance &appearance, bool has_slices) {
+  std::optional<isowave::Annotations> wanted = of_scene;
+  if (options.wanted == "none") {
+    wanted.reset();
+  } else if (!options.wanted.empty()) {
+    if (!wanted) wanted.emplace();
+    choose_annotations(options.wanted, appearance, has_slices, *wanted);
+  }
+  if (options.units.empty()) return wanted;
+  if (!wanted) throw Error("--units {}: nothing is annotated: give --annotate", options.units);
+  if (count_letters(printable_utf8(options.units)) > isowave::kMostUnits)
+    throw Error("--units {}: give at most {} letters", options.units, isowave::kMostUnits);
+  wanted->units = options.units;
   return wanted;
 }
 
 #ifndef ISOWAVE_HAS_CAIRO
 
+void check_cairo() {
+  throw Error(
+      "annotations: this isowave was built without Cairo: leave out --annotate, or give "
+      "--annotate none");
+}
 void draw_annotations(Image8 &, const std::vector<isowave::AnnotationGroup> &) {
-  throw Error("this isowave was built without Cairo");
+  check_cairo();
 }
 
 #else
+
+void check_cairo() {}
 
 namespace {
 

@@ -10,20 +10,24 @@
 
 namespace isowave::core::tools {
 
-/// Options as typed; read_annotations() checks them.
+/// Options as typed; read_annotations() checks them. Empty: as the scene has it.
 struct AnnotationOptions {
-  std::string wanted;  ///< names with commas, or "all"; empty: none
-  std::string units;   ///< of the world; empty: not said
+  std::string wanted;  ///< names with commas, "all", or "none"
+  std::string units;   ///< of the world
 };
 
 void add_annotation_options(CLI::App &command, AnnotationOptions &options);
 
+/// of_scene    annotations of the scene file, which the options change; none: it has none
 /// appearance  of the pictures; "all" has a colour bar if it has a colour map
-/// title       of the caption
-/// Throws      Error in one line: what there is not, or this program cannot draw
-std::optional<isowave::Annotations> read_annotations(const AnnotationOptions &options,
-                                                     const isowave::Appearance &appearance,
-                                                     const std::string &title);
+/// has_slices  "all" then has a colour bar, too
+/// Throws      Error in one line: what there is not
+std::optional<isowave::Annotations> read_annotations(
+    const AnnotationOptions &options, const std::optional<isowave::Annotations> &of_scene,
+    const isowave::Appearance &appearance, bool has_slices);
+
+/// Throws  Error: this program cannot draw annotations
+void check_cairo();
 
 /// Draws over an RGB or RGBA picture; RGBA becomes opaque there. Pixels without annotations keep
 /// their values.

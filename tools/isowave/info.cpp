@@ -14,6 +14,7 @@
 #include <system_error>
 
 #include "core/base/error.hpp"
+#include "core/io/json_list.hpp"
 #include "core/io/open_volume.hpp"
 #include "core/zfp/isovalue_suggestions.hpp"
 #include "core/zfp/level_bounds.hpp"
@@ -39,16 +40,16 @@ struct InfoArgs {
 };
 
 ordered_json describe_grid(const VolumeInfo &info) {
-  ordered_json result;
+  ordered_json result = ordered_json::object();
   result["dims"] = {info.dims.x, info.dims.y, info.dims.z};
   result["type"] = to_string(info.type);
   result["voxels"] = info.num_voxels();
   result["voxel_bytes"] = info.num_voxels() * size_of(info.type);
   result["spacing"] = {info.spacing.x, info.spacing.y, info.spacing.z};
   result["origin"] = {info.origin.x, info.origin.y, info.origin.z};
-  for (int axis = 0; axis < 3; ++axis) {
-    result["direction"].push_back(
-        {info.direction[axis].x, info.direction[axis].y, info.direction[axis].z});
+  for (int column = 0; column < 3; ++column) {
+    const glm::dvec3 axis = info.direction[column];
+    add_to_list<ordered_json>(result, "direction", {axis.x, axis.y, axis.z});
   }
   return result;
 }
@@ -96,8 +97,10 @@ Description describe_zfp(const std::string &path, const RawOverrides &overrides,
   if (!volume.no_data.empty()) result["no_data_voxels"] = volume.no_data.num_voxels();
   if (volume.max_voxel_error) result["max_voxel_error"] = *volume.max_voxel_error;
   for (const CompressedVolume &level : volume.coarser_levels) {
-    result["coarser"].push_back({level.info.dims.x, level.info.dims.y, level.info.dims.z});
-    if (!level.bounds.codes.empty()) result["level_errors"].push_back(largest_bound(level.bounds));
+    const glm::uvec3 dims = level.info.dims;
+    add_to_list<ordered_json>(result, "coarser", {dims.x, dims.y, dims.z});
+    if (!level.bounds.codes.empty())
+      add_to_list<ordered_json>(result, "level_errors", largest_bound(level.bounds));
   }
   if (known_voxel_error(volume)) result["errors"] = "stated";
   if (no_scan) return {result};
@@ -174,10 +177,9 @@ Description describe_voxels(const InfoArgs &options, const RawOverrides &overrid
 
 void add_suggestions(const IsovalueSuggestions &suggestions, ordered_json &result) {
   result["histogram"] = {{"range", suggestions.range}, {"counts", suggestions.counts}};
-  result["suggested_isovalues"] = ordered_json::array();
   for (const SuggestedIsovalue &suggested : suggestions.isovalues) {
-    result["suggested_isovalues"].push_back(
-        {{"isovalue", suggested.isovalue}, {"by", to_string(suggested.by)}});
+    add_to_list(result, "suggested_isovalues",
+                ordered_json{{"isovalue", suggested.isovalue}, {"by", to_string(suggested.by)}});
   }
 }
 
@@ -196,7 +198,7 @@ std::string to_text(const ordered_json &value) {
 
 void run(const InfoArgs &options) {
   const RawOverrides overrides = to_overrides(options.volume);
-  ordered_json result;
+  ordered_json result = ordered_json::object();
   result["file"] = options.input;
   std::error_code failure;
   if (std::filesystem::is_regular_file(options.input, failure))

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "core/accuracy/image_error.hpp"
 #include "core/api/choices.hpp"
 #include "core/host/host_renderer.hpp"
 #include "core/render/device_renderer.hpp"
@@ -42,6 +43,11 @@ std::vector<ParetoWay> make_ways() {
                     .max_surface_error = error,
                     .by = Evidence::kSample});
   }
+  for (const double error : {0.02, 0.005}) {
+    ways.push_back({.name = fmt::format("--max-image-error {}", error),
+                    .samples = 4,
+                    .max_image_error = error});
+  }
   for (const double ms : {2.0, 5.0, 10.0, 20.0, 50.0})
     ways.push_back({.name = fmt::format("--time-budget {}", ms), .time_budget_ms = ms});
   for (const char *solver : {"linear", "marmitt", "analytic"})
@@ -74,7 +80,8 @@ ImageSize size_of(const ParetoWay &way, ImageSize shown) {
 
 std::unique_ptr<Renderer> make_renderer(ocl::Device &device, const CompressedVolume &volume,
                                         const ParetoWay &way, ImageSize shown) {
-  const ImageSize size = size_of(way, shown);
+  const ImageSize own = size_of(way, shown),
+                  size = way.max_image_error ? with_room_for_tiles(own) : own;
   if (way.drawn_by == DrawnBy::kHost)
     return std::make_unique<HostRenderer>(volume, HostRendererOptions{.largest = size});
   if (way.drawn_by == DrawnBy::kTriangles)
@@ -97,6 +104,7 @@ FrameRequest request_of(const ParetoWay &way, ImageSize shown, float isovalue, d
   request.voxel_error = way.voxel_error * value_range;
   request.max_surface_error = way.max_surface_error;
   request.by = way.by;
+  request.max_image_error = way.max_image_error;
   request.time_budget_ms = way.time_budget_ms;
   request.normals = way.normals;
   request.ambient_rays = way.ambient_rays;

@@ -33,13 +33,13 @@ struct ParetoWay {
   std::uint32_t shrunk = 1;  ///< the picture has this part of the size, and is enlarged
   double voxel_pixels = 0;
   double voxel_error = 0;  ///< as a part of the range of values
-  std::optional<double> max_surface_error{}, time_budget_ms{};
+  std::optional<double> max_surface_error{}, max_image_error{}, time_budget_ms{};
   Evidence by = Evidence::kProof;  ///< of max_surface_error
   Normals normals = Normals::kSmooth;
   std::uint32_t ambient_rays = 0;
 
   bool needs_bounds() const { return max_surface_error && by == Evidence::kProof; }
-  bool needs_levels() const { return voxel_pixels > 0 || max_surface_error.has_value(); }
+  bool needs_levels() const { return voxel_pixels > 0 || max_surface_error || max_image_error; }
 };
 
 /// All of them, the default first.

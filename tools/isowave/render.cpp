@@ -41,6 +41,9 @@ namespace isowave::core::tools {
 
 namespace {
 
+/// Most rays of a pixel along each axis for --max-image-error, without --samples.
+constexpr std::uint32_t kImageErrorSamples = 4;
+
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
@@ -88,7 +91,8 @@ isowave::FrameRequest FrameOfMany::request() const {
   request.ambient_rays = options.ambient_rays;
   request.max_surface_error = options.max_surface_error;
   if (options.by == "sample") request.by = isowave::Evidence::kSample;
-  if (options.max_surface_error && drawing.cameras.size() > 1)
+  request.max_image_error = options.max_image_error;
+  if (chooses_detail(options) && drawing.cameras.size() > 1)
     std::ranges::transform(drawing.cameras, std::back_inserter(request.series), public_camera);
   request.time_budget_ms = options.time_budget;
   request.want_picture = !options.image.empty() || !options.movie.empty();
@@ -105,13 +109,14 @@ isowave::FrameRequest FrameOfMany::request() const {
   return request;
 }
 
-/// The picture, with --annotate.
+/// The picture, with its annotations.
 Image8 FrameOfMany::annotated(const isowave::FrameRequest &request, const Frame &frame) const {
   Image8 image = image_of(frame.size, frame.picture);
-  if (options.annotations) {
-    draw_annotations(image, isowave::annotation_layout(*options.annotations, request,
-                                                       frame.statistics.color_range));
-  }
+  if (!options.annotations) return image;
+  isowave::Annotations wanted = *options.annotations;
+  if (wanted.title.empty()) wanted.title = fs::path(options.input).filename().string();
+  draw_annotations(image, isowave::annotation_layout(wanted, request, frame.statistics.color_range,
+                                                     frame.statistics.slice_range));
   return image;
 }
 
@@ -123,6 +128,7 @@ void FrameOfMany::write_outputs(const isowave::FrameRequest &request, const Fram
       isowave::Scene scene = isowave::scene_of(request);
       scene.volume = options.input;
       scene.field = options.color_map.field;
+      scene.annotations = options.annotations;
       isowave::write_scene(scene, options.scene.save);
     }
     if (!options.image.empty() || drawing.movie) {
@@ -135,15 +141,20 @@ void FrameOfMany::write_outputs(const isowave::FrameRequest &request, const Fram
   });
 }
 
-/// With --max-surface-error: how far the frame may be off.
+/// With --max-surface-error or --max-image-error: how far the frame may be off.
 void FrameOfMany::report_error(const Frame &frame, ordered_json &entry) const {
   together(drawing.team, [&] {
     if (drawing.team.rank() != 0) return;
     const LastFrame &last = drawing.renderer->last();
-    entry["error"] = draws_bounds(options)
-                         ? tools::report_error(*options.max_surface_error, drawing.volume(), last,
-                                               frame, path(options.error_map))
-                         : report_sample(*options.max_surface_error, last.stats.detail.value());
+    const DetailChoice &choice = last.stats.detail.value();
+    if (options.max_image_error) {
+      entry["error"] = report_image_error(*options.max_image_error, choice);
+    } else if (draws_bounds(options)) {
+      entry["error"] = tools::report_error(*options.max_surface_error, drawing.volume(), last,
+                                           frame, path(options.error_map));
+    } else {
+      entry["error"] = report_sample(*options.max_surface_error, choice);
+    }
   });
 }
 
@@ -221,7 +232,7 @@ ordered_json draw_frame(const FrameOfMany &frame, ordered_json &own) {
     for (ordered_json *json : {&own, &entry}) json->erase("isovalue");  // surfaces are options
   }
   if (draws_layers(options)) entry["layers"] = report_layers(last.stats.layers);
-  if (options.max_surface_error) frame.report_error(drawn, entry);
+  if (chooses_detail(options)) frame.report_error(drawn, entry);
   if (options.time_budget) entry["time_budget"] = report_steps(last.stats, *options.time_budget);
   if (!options.refined.empty()) frame.write_refined(request);
   return entry;
@@ -404,8 +415,24 @@ void read_scene_of_file(const CLI::App &command, RenderArgs &options, Drawing &d
                 options.scene.file);
   options.transparent = request.appearance.transparent;
   options.light.shadow_rays = request.appearance.shadow_rays;
+  options.light.bounce_rays = request.appearance.bounce_rays;
+  options.annotations = scene.annotations;
   if (scene.camera && options.frame.orbit == 0 && !drawing.views.file)
     drawing.views.file = CameraFile{{}, {}, {}, {}, {core_camera(*scene.camera)}};
+}
+
+/// Reads what is drawn over pictures, and throws before any work what cannot be drawn.
+void read_annotations_of(RenderArgs &options, const Drawing &drawing) {
+  isowave::Appearance look = drawing.appearance;
+  const std::vector<isowave::Slice> slices =
+      options.slices.empty() ? read_slices(options.slice_options, {}, look) : options.slices;
+  options.annotations =
+      read_annotations(options.annotation_options, options.annotations, look, !slices.empty());
+  if (!options.annotations || !writes_annotated(options)) return;
+  check_cairo();
+  const ImageSize &size = drawing.views.size;
+  annotation_layout(*options.annotations,
+                    {.size = {size.width, size.height}, .appearance = look, .slices = slices}, {});
 }
 
 void run_render(const CLI::App &command, RenderArgs options) {
@@ -418,6 +445,8 @@ void run_render(const CLI::App &command, RenderArgs options) {
   }
   options.voxel_pixels = options.renderer_flags.voxel_pixels;
   options.names_picture = !asks_for_output(options);
+  if (options.max_image_error && command.count("--samples") == 0)
+    options.frame.samples = kImageErrorSamples;
   drawing.views = read_views(options.frame);
   if (options.scene.file.empty()) {
     read_scene_of_options(options, drawing);
@@ -429,13 +458,7 @@ void run_render(const CLI::App &command, RenderArgs options) {
   if (options.names_picture) options.image = default_image(options, drawing.views.count);
   check_options(command, options, drawing.team);
   find_series(command, options, drawing.team);
-  options.annotations = read_annotations(options.annotation_options, drawing.appearance,
-                                         fs::path(options.input).filename().string());
-  if (options.annotations) {  // or throws, before any work
-    const ImageSize &size = drawing.views.size;
-    annotation_layout(*options.annotations,
-                      {.size = {size.width, size.height}, .appearance = drawing.appearance}, {});
-  }
+  read_annotations_of(options, drawing);
   if (!options.scene.save.empty() && num_frames(options, drawing.views.count) > 1)
     throw Error("--save-scene: a scene is one picture: draw one isovalue from one view");
   set_wanted(options);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/accuracy/image_error.hpp"
 #include "core/api/choices.hpp"
 #include "core/base/error.hpp"
 #include "core/base/parallel_for.hpp"
@@ -32,6 +33,7 @@ void set_wanted(RenderArgs &options) {
   wanted.with_shading = asks_for_picture(options);
   wanted.with_kept_picture = options.time_budget.has_value();
   wanted.with_given_rays = options.ambient_rays != 0 || options.light.shadow_rays != 0;
+  wanted.with_bounce = options.light.bounce_rays != 0;
   wanted.with_bounds = draws_bounds(options);
   wanted.max_surfaces = static_cast<std::uint32_t>(options.surfaces.size());
   wanted.with_labels = has_labels(options.surfaces);
@@ -64,7 +66,7 @@ bool exceeds_host(const RenderArgs &options, const Drawing &drawing) {
 /// Whether levels of detail are chosen among those that the volume has. Small pictures of a time
 /// budget keep the finest level on CPUs: Abilities::levels_pay.
 bool chooses_levels(const RenderArgs &options, const Drawing &drawing) {
-  return options.max_surface_error ||
+  return chooses_detail(options) ||
          (options.time_budget && drawing.device && options.renderer_flags.pipeline != "blocks" &&
           !MarchPackets::suits(drawing.device->info()));
 }
@@ -136,7 +138,8 @@ void load_bricks(const RenderArgs &options, Drawing &drawing) {
 namespace {
 
 std::unique_ptr<Renderer> make_core_renderer(RenderArgs &options, Drawing &drawing) {
-  const ImageSize size = drawing.views.size;
+  const ImageSize shown = drawing.views.size,
+                  size = options.max_image_error ? with_room_for_tiles(shown) : shown;
   options.renderer = to_renderer_options(options.renderer_flags, size);
   if (options.reference)
     return std::make_unique<TwinRenderer>(drawing.whole, size, options.renderer.solver,

@@ -77,8 +77,15 @@ bool asks_for_output(const RenderArgs &options) {
 }
 
 bool asks_for_picture(const RenderArgs &options) {
-  return !options.image.empty() || !options.progress_dir.empty() || !options.refined.empty() ||
-         !options.movie.empty();
+  return writes_annotated(options) || !options.progress_dir.empty();
+}
+
+bool writes_annotated(const RenderArgs &options) {
+  return !options.image.empty() || !options.refined.empty() || !options.movie.empty();
+}
+
+bool chooses_detail(const RenderArgs &options) {
+  return options.max_surface_error || options.max_image_error;
 }
 
 bool draws_bounds(const RenderArgs &options) {
@@ -87,7 +94,7 @@ bool draws_bounds(const RenderArgs &options) {
 
 namespace {
 
-/// Checks --max-surface-error, --time-budget and the options that need them.
+/// Checks --max-surface-error, --max-image-error, --time-budget and the options that need them.
 void check_choice(const RenderArgs &options) {
   if (options.by == "sample" && !options.max_surface_error)
     throw Error("--by sample needs --max-surface-error");
@@ -97,19 +104,22 @@ void check_choice(const RenderArgs &options) {
     throw Error("--error-map has proven bounds: leave out --by sample");
   if (!options.time_budget && !options.refined.empty())
     throw Error("--refined needs --time-budget");
-  if (!options.max_surface_error && !options.time_budget) return;
-  const char *choice = options.max_surface_error ? "--max-surface-error" : "--time-budget";
+  if (!options.max_surface_error && !options.max_image_error && !options.time_budget) return;
+  const char *choice = options.max_surface_error ? "--max-surface-error"
+                       : options.max_image_error ? "--max-image-error"
+                                                 : "--time-budget";
   if (options.reference) throw Error("--reference draws every frame in full: leave out {}", choice);
   if (options.time_budget) check_time_budget(*options.time_budget);
   if (options.time_budget && !options.progress_dir.empty())
     throw Error("--time-budget draws a frame in steps: leave out --progress-dir");
-  if (!options.max_surface_error) return;
-  check_max_surface_error(*options.max_surface_error);
-  if (options.time_budget)
-    throw Error("--max-surface-error cannot keep a time: leave out --time-budget");
+  if (options.max_surface_error) check_max_surface_error(*options.max_surface_error);
+  if (options.max_image_error) check_max_image_error(*options.max_image_error);
+  if (options.max_surface_error && options.max_image_error)
+    throw Error("--max-surface-error and --max-image-error choose the detail: leave out either");
+  if (!options.max_surface_error && !options.max_image_error) return;
+  if (options.time_budget) throw Error("{} cannot keep a time: leave out --time-budget", choice);
   if (options.frame.voxel_error > 0 || options.voxel_pixels > 0)
-    throw Error(
-        "--max-surface-error chooses the detail: leave out --voxel-error and --voxel-pixels");
+    throw Error("{} chooses the detail: leave out --voxel-error and --voxel-pixels", choice);
 }
 
 /// Checks what --slice excludes.
@@ -123,8 +133,10 @@ void check_slice_options(const CLI::App &command, const RenderArgs &options, con
     throw Error("{} surfaces and {} slices are more than a frame can have: give at most {}",
                 num_surfaces, num_slices, ISO_MAX_SURFACES);
   if (team.size() > 1) throw Error("--slice: a team draws without slices");
-  refuse_options(command, {"--voxel-pixels", "--max-surface-error", "--time-budget"},
-                 "--slice draws without it: leave out either");
+  refuse_options(
+      command,
+      {"--voxel-pixels", "--max-surface-error", "--max-image-error", "--time-budget", "--bounce"},
+      "--slice draws without it: leave out either");
   if (options.renderer_flags.pipeline == "blocks")
     refuse_options(command, {"--slice"}, "--pipeline blocks draws one opaque surface");
   if (solver_from_string(options.renderer_flags.solver).kind != kDefaultSolver.kind)
@@ -143,13 +155,12 @@ void check_label_options(const CLI::App &command, const RenderArgs &options, con
   refuse_options(command, {"--isovalue", "--surface"},
                  "--labels draws surfaces of labels alone: leave out either");
   refuse_options(command, {"--color"}, "surfaces have colours of their own: --labels LABELS,COLOR");
-  refuse_options(
-      command,
-      {"--voxel-pixels", "--voxel-error", "--max-surface-error", "--time-budget", "--slice",
-       "--reference", "--rate", "--tolerance", "--tolerance-relative", "--no-data"},
-      "labels are drawn without it: leave it out");
+  refuse_options(command,
+                 {"--voxel-pixels", "--voxel-error", "--max-surface-error", "--max-image-error",
+                  "--time-budget", "--slice", "--reference", "--rate", "--tolerance",
+                  "--tolerance-relative", "--no-data", "--bounce"},
+                 "labels are drawn without it: leave it out");
   check_light_rays(options);
-  if (options.color_map.by_field) throw Error("labels are drawn without colours by a field");
   if (!options.slices.empty()) throw Error("labels are drawn without slices");
   if (options.renderer_flags.pipeline == "blocks")
     refuse_options(command, {"--pipeline"}, "pipeline blocks draws no labels: leave it out");
@@ -167,8 +178,10 @@ void check_surface_options(const CLI::App &command, const RenderArgs &options, c
   refuse_options(command, {"--isovalue"},
                  "draws pictures of one surface each, --surface one of all: leave out either");
   refuse_options(command, {"--color"}, "surfaces have colours of their own: --surface VALUE,COLOR");
-  refuse_options(command, {"--voxel-pixels", "--max-surface-error", "--time-budget"},
-                 "--surface draws without it: leave it out, or draw one surface by --isovalue");
+  refuse_options(
+      command,
+      {"--voxel-pixels", "--max-surface-error", "--max-image-error", "--time-budget", "--bounce"},
+      "--surface draws without it: leave it out, or draw one surface by --isovalue");
   if (team.size() > 1)
     refuse_options(command, {"--ambient", "--shadow"},
                    "with mpirun, --surface draws without it: leave out either");
@@ -227,18 +240,20 @@ void check_options(const CLI::App &command, const RenderArgs &options, const Tea
     throw Error("--reference has no passes: leave out --progress-dir");
   if (!asks_for_picture(options)) {
     refuse_options(command,
-                   {"--color", "--color-by", "--background", "--light", "--shadow", "--light-angle",
-                    "--transparent", "--normals", "--ambient", "--slice"},
+                   {"--color", "--color-by", "--background", "--light", "--shadow", "--bounce",
+                    "--light-angle", "--transparent", "--normals", "--ambient", "--slice"},
                    "no picture is written: give --output");
   }
-  if (options.image.empty() && options.refined.empty() && options.movie.empty())
-    refuse_options(command, {"--annotate"}, "no picture is annotated: give --output");
+  if (!writes_annotated(options))
+    refuse_options(command, {"--annotate", "--units"}, "no picture is annotated: give --output");
   if (!options.color_map.by.empty() && !options.color_map.by_field)
     refuse_options(command, {"--color"}, "--color-by colours surfaces: leave out either");
   if (options.color_map.by_field) {
     if (team.size() > 1) throw Error("colours by a field: a team draws without them");
     refuse_options(command, {"--time-budget"}, "colours by a field are drawn without a time");
   }
+  if (team.size() > 1)
+    refuse_options(command, {"--bounce"}, "a team draws without bounced light: leave out either");
   if (options.transparent)
     refuse_options(command, {"--background"}, "pictures with --transparent have none");
   if (options.stats.empty())
@@ -306,11 +321,11 @@ void check_brick_levels(const RenderArgs &options, const std::vector<VolumeInfo>
   const CompressionOptions &compression = options.frame.compression;
   const bool makes_levels =
       !is_zfp_name(options.input) &&
-      (compression.levels != 1 || (options.max_surface_error && !says_levels(compression)));
+      (compression.levels != 1 || (chooses_detail(options) && !says_levels(compression)));
   if (options.voxel_pixels == 0 && !makes_levels) return;
   throw Error(
       "{} has no levels of detail, which bricks cannot make: isowave convert --levels all{}",
-      options.input, options.max_surface_error ? ", or do without them: --levels 1" : "");
+      options.input, chooses_detail(options) ? ", or do without them: --levels 1" : "");
 }
 
 namespace {
@@ -319,11 +334,11 @@ namespace {
 void group_render_options(CLI::App &command) {
   group_options(
       command, "Options of every day",
-      {"--help",     "--isovalue", "--surface",     "--labels",    "--scene",      "--output",
-       "--size",     "--samples",  "--orbit",       "--turntable", "--steps",      "--cameras",
-       "--parallel", "--color",    "--color-by",    "--color-map", "--background", "--transparent",
-       "--light",    "--shadow",   "--light-angle", "--normals",   "--ambient",    "--annotate",
-       "--units",    "--device"});
+      {"--help",     "--isovalue", "--surface",  "--labels",      "--scene",      "--output",
+       "--size",     "--samples",  "--orbit",    "--turntable",   "--steps",      "--cameras",
+       "--parallel", "--color",    "--color-by", "--color-map",   "--background", "--transparent",
+       "--light",    "--shadow",   "--bounce",   "--light-angle", "--normals",    "--ambient",
+       "--annotate", "--units",    "--device"});
   group_options(command, "Clipping and slices",
                 {"--clip", "--clip-box", "--no-caps", "--slice", "--slice-opacity", "--slice-map",
                  "--slice-range"});
@@ -331,7 +346,7 @@ void group_render_options(CLI::App &command) {
   group_compression_options(command);
   group_options(command, "Precision and time",
                 {"--voxel-pixels", "--voxel-error", "--max-surface-error", "--by", "--error-map",
-                 "--time-budget", "--refined"});
+                 "--max-image-error", "--time-budget", "--refined"});
   group_options(command, "Memory", {"--memory-budget", "--cache-slots", "--stream", "--verbose"});
   group_options(command, "Several processes, by mpirun", {"--bricks"});
   group_options(command, "Further outputs",
@@ -406,7 +421,7 @@ void add_render_options(CLI::App &command, RenderArgs &options) {
   command
       .add_option("--samples", options.frame.samples,
                   "N x N rays per pixel, whose mean colour it gets; other options still count the "
-                  "picture's pixels")
+                  "picture's pixels. With --max-image-error: the most [4]")
       ->check(CLI::Range(1u, ImageSize::kMaxSamples))
       ->capture_default_str();
   command.add_option("--device", options.device,
@@ -445,6 +460,11 @@ void add_render_options(CLI::App &command, RenderArgs &options) {
       "--error-map", options.error_map,
       "float32 .npy [H,W] for --max-surface-error: the bound of each pixel, or ray; inf: there "
       "is none");
+  command.add_option(
+      "--max-image-error", options.max_image_error,
+      "largest error of the picture, the mean of FLIP's over all pixels, 0 to 1, against 64 rays a "
+      "pixel at full detail: rays, up to --samples, and levels of detail are chosen so that it is "
+      "kept with 95 % confidence, by tiles of the picture");
   command.add_option("--time-budget", options.time_budget,
                      "time for each frame [ms]: draws a small picture first, if need be, then "
                      "larger ones, as long as there is time");

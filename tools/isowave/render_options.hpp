@@ -44,7 +44,7 @@ struct RenderArgs {
   ColorMapOptions color_map;
   LightOptions light;
   AnnotationOptions annotation_options;
-  std::optional<isowave::Annotations> annotations;  ///< what they ask for
+  std::optional<isowave::Annotations> annotations;  ///< what they, or the scene, ask for
   std::string color = "#DBBD87", background = "#FFFFFF";
   std::string image, depth, stats, progress_dir, error_map, refined, movie;
   double fps = 25;                 ///< of the movie
@@ -55,6 +55,7 @@ struct RenderArgs {
   std::size_t step_digits = 1;     ///< of numbers in names
   std::optional<double> max_surface_error;  ///< pixels
   std::string by = "proof";                 ///< or "sample": FrameRequest::by
+  std::optional<double> max_image_error;    ///< FLIP
   std::optional<double> time_budget;        ///< ms
   double voxel_pixels = 0;                  ///< FrameRequest::voxel_pixels
   std::string normals = "smooth";
@@ -89,6 +90,10 @@ void print_picture_name(const RenderArgs &options, std::size_t num_views);
 bool asks_for_output(const RenderArgs &options);
 /// Whether a picture is written.
 bool asks_for_picture(const RenderArgs &options);
+/// Whether an error is given, for which levels of detail are chosen.
+bool chooses_detail(const RenderArgs &options);
+/// Whether a picture is written that gets annotations.
+bool writes_annotated(const RenderArgs &options);
 /// Whether bounds of the error are drawn: for --max-surface-error, by proof.
 bool draws_bounds(const RenderArgs &options);
 

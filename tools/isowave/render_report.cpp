@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "core/accuracy/image_error.hpp"
 #include "core/accuracy/ray_sample.hpp"
 #include "core/io/npy.hpp"
 #include "core/zfp/describe_compression.hpp"
@@ -96,6 +97,29 @@ nlohmann::ordered_json report_sample(double max_surface_error, const DetailChoic
           {"lowest_share", sample.lowest},          {"confidence", kConfidence}};
 }
 
+nlohmann::ordered_json report_image_error(double max_image_error, const DetailChoice &choice) {
+  const ImageError &image = choice.image.value();
+  fmt::print(
+      "  FLIP {:.2g} of {} tiles, up to {:.2g} with 95 % confidence (Student's t), against {} rays "
+      "a pixel at full detail\n"
+      "  with {} x {} rays a pixel and voxels up to {:.3g} pixels apart; {}\n",
+      image.mean, image.num_tiles, image.highest, kReferenceSamples * kReferenceSamples,
+      image.samples, image.samples, choice.detail.voxel_pixels, chosen_in(choice));
+  if (!choice.reachable)
+    warn(fmt::format("the picture's error cannot be kept at {}: {}", max_image_error,
+                     choice.advice));
+  nlohmann::ordered_json tries = nlohmann::ordered_json::array();
+  for (const ImageError::Try &each : image.tries) {
+    tries.push_back(
+        {{"samples", each.samples}, {"voxel_pixels", each.voxel_pixels}, {"flip", each.error}});
+  }
+  return {{"max_image_error", max_image_error}, {"reachable", choice.reachable},
+          {"samples", image.samples},           {"voxel_pixels", choice.detail.voxel_pixels},
+          {"tiles", image.num_tiles},           {"flip", image.mean},
+          {"highest_flip", image.highest},      {"tries", tries},
+          {"choice_ms", choice.total_ms}};
+}
+
 nlohmann::ordered_json report_error(double max_surface_error, const CompressedVolume &volume,
                                     const LastFrame &last, const Frame &frame,
                                     const std::filesystem::path &error_map) {
@@ -174,6 +198,7 @@ nlohmann::ordered_json options_json(const RenderArgs &options, ImageSize size,
   if (!options.light.direction.empty())
     json["light"] = {{"direction", options.light.direction},
                      {"shadow_rays", options.light.shadow_rays},
+                     {"bounce_rays", options.light.bounce_rays},
                      {"angle", options.light.angle}};
   if (!options.scene.file.empty()) json["scene"] = options.scene.file;
   if (!options.color_map.by.empty())

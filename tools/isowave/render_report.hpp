@@ -19,6 +19,9 @@ nlohmann::ordered_json report_layers(const LayerStats &layers);
 nlohmann::ordered_json report_steps(const FrameStats &stats, double budget_ms);
 /// Prints how the detail of a frame was chosen by sample. Returns its JSON.
 nlohmann::ordered_json report_sample(double max_surface_error, const DetailChoice &choice);
+/// Prints how the rays and the detail of a frame were chosen for its picture's error. Returns its
+/// JSON.
+nlohmann::ordered_json report_image_error(double max_image_error, const DetailChoice &choice);
 /// Prints how far the last frame may be off by proof, and writes its bounds to error_map, if that
 /// is not empty. Returns its JSON.
 nlohmann::ordered_json report_error(double max_surface_error, const CompressedVolume &volume,

@@ -93,7 +93,7 @@ ordered_json frame_json(double isovalue, std::size_t view, const Camera &camera,
 }
 
 ordered_json memory_json(const ocl::MemoryLedger &ledger) {
-  ordered_json by_name;
+  ordered_json by_name = ordered_json::object();
   for (const auto &[name, entry] : ledger.by_name()) {
     by_name[name] = {{"current", entry.current}, {"peak", entry.peak}};
   }

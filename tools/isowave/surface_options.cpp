@@ -88,6 +88,13 @@ void add_light_options(CLI::App &command, LightOptions &options) {
       ->check(CLI::Range(1u, ISO_MAX_AMBIENT_RAYS))
       ->needs(light);
   command
+      .add_option("--bounce", options.bounce_rays,
+                  "rays of each hit that bring light from other places of the surface, as a matt "
+                  "surface sends it on: 16 and more. They are its ambient rays, too. Each takes "
+                  "about as long as two frames without any")
+      ->check(CLI::Range(1u, ISO_MAX_AMBIENT_RAYS))
+      ->needs(light);
+  command
       .add_option("--light-angle", options.angle,
                   "half of the angle that the light has in soft shadows [degrees]")
       ->check(CLI::Range(0.01, 45.0))
@@ -97,6 +104,7 @@ void add_light_options(CLI::App &command, LightOptions &options) {
 
 void read_light(const LightOptions &options, isowave::Appearance &appearance) {
   appearance.shadow_rays = options.shadow_rays;
+  appearance.bounce_rays = options.bounce_rays;
   appearance.light_angle = options.angle;
   if (options.direction.empty()) return;
   Vector3 direction{};
@@ -119,15 +127,40 @@ void add_color_map_options(CLI::App &command, ColorMapOptions &options) {
                   "`volume` to show the voxels of the same one on caps. LOW,HIGH: distances or "
                   "values of the first and the "
                   "last colour [those of the volume's box, or of the field at the hits; with "
-                  "--surface, of the whole field]")
-      ->type_name("x|y|z|NX,NY,NZ|FILE|volume[,LOW,HIGH]");
-  command.add_option("--color-map", options.map, "colours of --color-by")
+                  "--surface, of the whole field]. `labels`: with --labels, by each label; or by "
+                  "those of another segmentation: FILE,labels")
+      ->type_name("x|y|z|NX,NY,NZ|FILE|volume[,LOW,HIGH]|labels|FILE,labels");
+  command
+      .add_option("--color-map", options.map, "colours of --color-by [viridis; by labels, labels]")
       ->check(CLI::IsMember(isowave::color_map_names()))
-      ->needs("--color-by")
-      ->capture_default_str();
+      ->needs("--color-by");
 }
 
 namespace {
+
+void set_map(const ColorMapOptions &options, const char *otherwise,
+             isowave::Appearance &appearance) {
+  appearance.color_map = options.map.empty() ? otherwise : options.map;
+}
+
+/// labels or FILE,labels; false: it is neither.
+bool read_labelled_field(ColorMapOptions &options, isowave::Appearance &appearance) {
+  constexpr std::string_view kEnd = ",labels";
+  std::string name = options.by;
+  if (name == "labels") {
+    name = "volume";
+  } else if (name.ends_with(kEnd) && !std::filesystem::exists(name)) {
+    name.resize(name.size() - kEnd.size());
+  } else {
+    return false;
+  }
+  if (name != "volume" && !std::filesystem::is_regular_file(name)) return false;
+  set_map(options, "labels", appearance);
+  appearance.color_by_field = appearance.color_by_label = true;
+  options.field = name;
+  options.by_field = true;
+  return true;
+}
 
 /// FILE[,LOW,HIGH] or volume[,LOW,HIGH]; false: it is neither. An axis stays one if a file has its
 /// name: ./z is that file.
@@ -146,7 +179,7 @@ bool read_field(ColorMapOptions &options, isowave::Appearance &appearance) {
   }
   if ((name != "volume" && !std::filesystem::is_regular_file(name)) || range.size() == 1)
     return false;
-  appearance.color_map = options.map;
+  set_map(options, "viridis", appearance);
   appearance.color_by_field = true;
   appearance.color_caps_alone = name == "volume";  // a surface has one value of its own volume
   options.field = name;
@@ -161,11 +194,13 @@ bool read_field(ColorMapOptions &options, isowave::Appearance &appearance) {
 }  // namespace
 
 void read_color_map(ColorMapOptions &options, isowave::Appearance &appearance) {
-  if (options.by.empty() || read_field(options, appearance)) return;
+  if (options.by.empty() || read_labelled_field(options, appearance) ||
+      read_field(options, appearance))
+    return;
   const auto refuse = [&] {
     return Error(
         "--color-by {}: give x, y, z, NX,NY,NZ, volume or a file, and LOW,HIGH if "
-        "wanted",
+        "wanted; or labels, or a file and labels",
         options.by);
   };
   std::vector<double> numbers;
@@ -181,7 +216,7 @@ void read_color_map(ColorMapOptions &options, isowave::Appearance &appearance) {
     }
   }
   if (numbers.size() != 3 && numbers.size() != 5) throw refuse();
-  appearance.color_map = options.map;
+  set_map(options, "viridis", appearance);
   appearance.color_axis = {numbers[0], numbers[1], numbers[2]};
   ColorByAxis by{.axis = {numbers[0], numbers[1], numbers[2]}};
   if (numbers.size() == 5) {

@@ -25,7 +25,7 @@ void read_background(const std::string &text, isowave::Appearance &appearance);
 /// Options as typed; read_light() checks them.
 struct LightOptions {
   std::string direction;  ///< X,Y,Z; empty: none
-  std::uint32_t shadow_rays = 0;
+  std::uint32_t shadow_rays = 0, bounce_rays = 0;
   double angle = 3;  ///< degrees
 };
 
@@ -36,10 +36,11 @@ void read_light(const LightOptions &options, isowave::Appearance &appearance);
 /// --color-by and --color-map as typed; read_color_map() checks them. A scene file sets the fields
 /// that read_color_map() would.
 struct ColorMapOptions {
-  std::string by;               ///< X, Y, Z, NX,NY,NZ, `volume` or a file, and [,LOW,HIGH]
-  std::string field{};          ///< set by read_color_map(): `volume`, a file, or none
-  bool by_field = false;        ///< set by read_color_map(): colours are by it
-  std::string map = "viridis";  ///< see core/view/color_maps.hpp
+  /// X, Y, Z, NX,NY,NZ, `volume` or a file, and [,LOW,HIGH]; or `labels`, or a file and `,labels`
+  std::string by;
+  std::string field{};    ///< set by read_color_map(): `volume`, a file, or none
+  bool by_field = false;  ///< set by read_color_map(): colours are by it
+  std::string map{};      ///< see core/view/color_maps.hpp; empty: viridis, or by labels, labels
 };
 
 void add_color_map_options(CLI::App &command, ColorMapOptions &options);

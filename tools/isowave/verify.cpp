@@ -8,6 +8,7 @@
 
 #include "core/base/error.hpp"
 #include "core/io/file_name.hpp"
+#include "core/io/json_list.hpp"
 #include "core/paper/blocks_pipeline.hpp"
 #include "core/render/device_renderer.hpp"
 #include "reference/stability_suite.hpp"
@@ -105,10 +106,11 @@ std::uint64_t verify_solver(const VerifyArgs &options, std::string_view name, oc
   }
   ordered_json surfaces = ordered_json::array();
   failures += verify_watertight(options, solver, device, surfaces);
-  document["solvers"].push_back({{"solver", name},
-                                 {"cases", std::move(cases)},
-                                 {"watertight", std::move(surfaces)},
-                                 {"failures", failures}});
+  add_to_list(document, "solvers",
+              ordered_json{{"solver", name},
+                           {"cases", std::move(cases)},
+                           {"watertight", std::move(surfaces)},
+                           {"failures", failures}});
   return failures;
 }
 

@@ -5,6 +5,7 @@
 #include "core/accuracy/choose_detail.hpp"
 #include "core/accuracy/with_choices.hpp"
 #include "core/base/error.hpp"
+#include "core/io/json_list.hpp"
 #include "core/render/device_renderer.hpp"
 #include "core/zfp/isovalue.hpp"
 #include "reference/accuracy.hpp"
@@ -67,20 +68,21 @@ std::uint64_t verify_errors(const VerifyFramesOptions &options, nlohmann::ordere
                      ? 100.0
                      : 100.0 * double(summary.num_certified) / double(summary.num_pixels),
                  with_commas(summary.num_uncertain), tally.exceeded, slack.p50);
-      document["frames"].push_back({{"volume", options.input},
-                                    {"drawn_by", info.name},
-                                    {"isovalue", isovalue},
-                                    {"view", view},
-                                    {"max_surface_error", max_surface_error},
-                                    {"voxel_pixels", choice.detail.voxel_pixels},
-                                    {"voxel_error", choice.detail.voxel_error},
-                                    {"reachable", choice.reachable},
-                                    {"pixels", summary.num_pixels},
-                                    {"certified", summary.num_certified},
-                                    {"uncertain", summary.num_uncertain},
-                                    {"misses", tally.misses},
-                                    {"exceeded", tally.exceeded},
-                                    {"slack", quantiles_json(slack)}});
+      add_to_list(document, "frames",
+                  nlohmann::ordered_json{{"volume", options.input},
+                                         {"drawn_by", info.name},
+                                         {"isovalue", isovalue},
+                                         {"view", view},
+                                         {"max_surface_error", max_surface_error},
+                                         {"voxel_pixels", choice.detail.voxel_pixels},
+                                         {"voxel_error", choice.detail.voxel_error},
+                                         {"reachable", choice.reachable},
+                                         {"pixels", summary.num_pixels},
+                                         {"certified", summary.num_certified},
+                                         {"uncertain", summary.num_uncertain},
+                                         {"misses", tally.misses},
+                                         {"exceeded", tally.exceeded},
+                                         {"slack", quantiles_json(slack)}});
       exceeded += tally.exceeded;
     }
   }

@@ -9,6 +9,7 @@
 
 #include "core/base/error.hpp"
 #include "core/host/host_renderer.hpp"
+#include "core/io/json_list.hpp"
 #include "core/render/device_renderer.hpp"
 #include "core/zfp/isovalue.hpp"
 #include "reference/cell_oracle.hpp"
@@ -98,7 +99,7 @@ void judge_all(const std::vector<FrameJudge> &judges, const FrameParams &frame, 
       ++totals.judged;
     }
     entry.update(labels);
-    document["frames"].push_back(std::move(entry));
+    add_to_list(document, "frames", std::move(entry));
   }
 }
 
@@ -114,7 +115,7 @@ void judge_clipped_frame(const ClipOracle &oracle, const FrameParams &frame, std
   entry.update(clip_accuracy_json(tally));
   entry["seconds"] = seconds_since(begin);
   entry.update(labels);
-  document["frames"].push_back(std::move(entry));
+  add_to_list(document, "frames", std::move(entry));
   totals.failures += tally.failures();
   ++totals.judged;
 }
@@ -206,7 +207,7 @@ std::uint64_t verify_frames(const VerifyFramesOptions &options,
             "{:<28} float32 rays are off the camera's by p50 {:.1e}, p99 {:.1e}, max {:.1e} "
             "voxels\n",
             "", rounding.p50, rounding.p99, rounding.max);
-        document["ray_rounding_voxels"].push_back(quantiles_json(rounding));
+        add_to_list(document, "ray_rounding_voxels", quantiles_json(rounding));
       }
     }
   }

@@ -6,6 +6,7 @@
 
 #include "core/base/error.hpp"
 #include "core/base/ms_since.hpp"
+#include "core/io/json_list.hpp"
 #include "core/zfp/isovalue.hpp"
 #include "reference/twin.hpp"
 #include "tools/isowave/accuracy_report.hpp"
@@ -84,7 +85,7 @@ std::uint64_t verify_layers(const VerifyFramesOptions &options, ordered_json &do
     entry["drawn_by"] = drawer.name;
     entry["surfaces"] = surfaces_json(surfaces);
     entry["view"] = view;
-    document["frames"].push_back(std::move(entry));
+    add_to_list(document, "frames", std::move(entry));
     failures += tally.failures();
   }
   return failures;

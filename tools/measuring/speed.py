@@ -100,6 +100,7 @@ def scenes(run):
         {"light": "0.5,1,0.7"},
         {"light": "0.5,1,0.7", "shadow": 1},
         {"light": "0.5,1,0.7", "shadow": 16},
+        {"light": "0.5,1,0.7", "bounce": 16},
         {"values_of": True},
         {"slice": ["z"]},
         {"slice": ["x", "y", "z"]},

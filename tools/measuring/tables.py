@@ -84,9 +84,10 @@ def scenes(rows):
             first[row["volume"]] = row["warm"]["median"]
         scene = "one opaque surface"
         if option(row, "--light") is not None:
-            shadow = option(row, "--shadow")
+            shadow, bounce = option(row, "--shadow"), option(row, "--bounce")
             kinds = {None: "a light", "1": "hard shadows"}
-            scene += ", " + kinds.get(shadow, f"soft shadows of {shadow} rays")
+            kind = kinds.get(shadow, f"soft shadows of {shadow} rays")
+            scene += ", " + (kind if bounce is None else f"light that bounces by {bounce} rays")
         if option(row, "--values-of") is not None:
             scene += ", colours by a second volume"
         if slices := arguments.count("--slice"):

@@ -30,18 +30,11 @@ nb::dict dict_of(const isowave::AnnotationGroup &group) {
 }
 
 nb::list annotation_layout(const nb::dict &wanted, const nb::dict &request,
-                           const std::optional<std::array<double, 2>> &color_range) {
-  isowave::Annotations annotations;
-  const auto get = reader_of(wanted);
-  get("scale_bar", annotations.scale_bar);
-  get("axes", annotations.axes);
-  get("color_bar", annotations.color_bar);
-  get("caption", annotations.caption);
-  get("units", annotations.units);
-  get("title", annotations.title);
+                           const std::optional<std::array<double, 2>> &color_range,
+                           const std::optional<std::array<double, 2>> &slice_range) {
   nb::list result;
-  for (const isowave::AnnotationGroup &group :
-       isowave::annotation_layout(annotations, request_of(request), color_range))
+  for (const isowave::AnnotationGroup &group : isowave::annotation_layout(
+           annotations_of(wanted), request_of(request), color_range, slice_range))
     result.append(dict_of(group));
   return result;
 }
@@ -49,7 +42,8 @@ nb::list annotation_layout(const nb::dict &wanted, const nb::dict &request,
 }  // namespace
 
 void add_annotations(nb::module_ &m) {
-  m.def("annotation_layout", &annotation_layout, "wanted"_a, "request"_a, "color_range"_a.none());
+  m.def("annotation_layout", &annotation_layout, "wanted"_a, "request"_a, "color_range"_a.none(),
+        "slice_range"_a.none());
 }
 
 }  // namespace isowave_python

@@ -97,6 +97,9 @@ nb::dict statistics_dict(const isowave::FrameStatistics &statistics) {
   result["color_range"] = nb::none();
   if (const auto &range = statistics.color_range)
     result["color_range"] = nb::make_tuple((*range)[0], (*range)[1]);
+  result["slice_range"] = nb::none();
+  if (const auto &range = statistics.slice_range)
+    result["slice_range"] = nb::make_tuple((*range)[0], (*range)[1]);
   result["uploaded_bytes"] = statistics.uploaded_bytes;
   result["first_level"] = statistics.first_level;
   result["last_level"] = statistics.last_level;
@@ -160,6 +163,12 @@ nb::dict frame_dict(isowave::Frame &&frame, bool is_of_rays = false) {
       detail["sampled_hits"] = sample->num_hits;
       detail["within"] = sample->num_within;
       detail["lowest_share"] = sample->lowest;
+    }
+    if (const auto &image = frame.detail->image) {
+      detail["samples"] = image->samples;
+      detail["tiles"] = image->num_tiles;
+      detail["flip"] = image->mean;
+      detail["highest_flip"] = image->highest;
     }
     statistics["detail"] = detail;
   }

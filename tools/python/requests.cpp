@@ -56,6 +56,10 @@ auto field_reader_of(const nb::dict &options) {
       std::optional<nb::dict> camera;
       get(name, camera);
       if (camera) for_each_camera_field(field.emplace(), reader_of(*camera));
+    } else if constexpr (std::is_same_v<Field, std::optional<isowave::Annotations>>) {
+      std::optional<nb::dict> annotations;
+      get(name, annotations);
+      if (annotations) field = annotations_of(*annotations);
     } else if constexpr (!std::is_enum_v<Field>) {
       get(name, field);
     }
@@ -68,6 +72,12 @@ auto field_writer_to(nb::dict &result) {
 }
 
 }  // namespace
+
+isowave::Annotations annotations_of(const nb::dict &fields) {
+  isowave::Annotations annotations;
+  isowave::for_each_annotations_field(annotations, reader_of(fields));
+  return annotations;
+}
 
 isowave::FrameRequest request_of(const nb::dict &options) {
   isowave::FrameRequest request;
@@ -90,6 +100,12 @@ nb::dict dict_of(const isowave::Scene &scene) {
       nb::dict camera;
       for_each_camera_field(*field, field_writer_to(camera));
       result[name] = camera;
+    } else if constexpr (std::is_same_v<Field, std::optional<isowave::Annotations>>) {
+      result[name] = nb::none();
+      if (!field) return;
+      nb::dict annotations;
+      for_each_annotations_field(*field, field_writer_to(annotations));
+      result[name] = annotations;
     } else if constexpr (std::is_same_v<Field, std::vector<isowave::ClipPlane>>) {
       nb::list planes;
       for (const isowave::ClipPlane &plane : field) {
@@ -136,6 +152,7 @@ isowave::RendererOptions renderer_options_of(const nb::dict &options) {
   get("with_bounds", result.with_bounds);
   get("with_time_budget", result.with_time_budget);
   get("with_rays", result.with_rays);
+  get("with_bounce", result.with_bounce);
   get("with_surfaces", result.with_surfaces);
   get("with_labels", result.with_labels);
   return result;

@@ -10,6 +10,7 @@ isowave::Normals normals_of(const std::string &name);
 /// Fields that are not there, or None, have their defaults. Python does not set
 /// FrameRequest::bound.
 isowave::FrameRequest request_of(const nb::dict &options);
+isowave::Annotations annotations_of(const nb::dict &fields);
 isowave::Scene scene_of(const nb::dict &fields);
 isowave::RendererOptions renderer_options_of(const nb::dict &options);
 

@@ -4,6 +4,7 @@
 // Image.annotated() of the Python package by Pillow.
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -18,12 +19,29 @@ struct Annotations {
   /// 1, 2 or 5 times a power of ten world units, 10 to 25 % of the picture's width: at the depth of
   /// the point that the camera looks at, which the label of a perspective picture says.
   bool scale_bar = false;
-  bool axes = false;       ///< directions of x, y and z in world space
-  bool color_bar = false;  ///< of Appearance::color_map; left out if there is no range
-  bool caption = false;    ///< the title, and the isovalues beside their colours
-  std::string units{};     ///< of the world, such as "mm"; empty: lengths have none
-  std::string title{};     ///< such as the name of the volume's file; empty: none
+  bool axes = false;  ///< directions of x, y and z in world space
+  /// Bars of Appearance::color_map, and of slice_map if there are slices; left out without a range.
+  bool color_bar = false;
+  bool caption = false;  ///< the title, and the isovalues beside their colours
+  std::string units{};   ///< of the world, such as "mm"; empty: lengths have none
+  std::string title{};   ///< such as the name of the volume's file; empty: none
 };
+
+/// Most letters of units in scene files and in the options of programs.
+inline constexpr std::size_t kMostUnits = 16;
+
+/// Calls visit(name, field) for each field.
+///
+/// annotations  Annotations, or const ones
+template <class AnyAnnotations, class Visit>
+void for_each_annotations_field(AnyAnnotations &annotations, const Visit &visit) {
+  visit("scale_bar", annotations.scale_bar);
+  visit("axes", annotations.axes);
+  visit("color_bar", annotations.color_bar);
+  visit("caption", annotations.caption);
+  visit("units", annotations.units);
+  visit("title", annotations.title);
+}
 
 /// Pixels from the picture's upper left corner, to the right and down.
 using PicturePlace = std::array<double, 2>;
@@ -62,10 +80,12 @@ struct AnnotationGroup {
 ///
 /// request      its camera, size, isovalues, colours and background
 /// color_range  FrameStatistics::color_range of the frame
+/// slice_range  FrameStatistics::slice_range of the frame
 /// Throws       Error: the picture has less than 200 x 150 pixels; a colour bar is wanted without a
-///              colour map
+///              colour map and slices
 std::vector<AnnotationGroup> annotation_layout(
     const Annotations &wanted, const FrameRequest &request,
-    const std::optional<std::array<double, 2>> &color_range);
+    const std::optional<std::array<double, 2>> &color_range,
+    const std::optional<std::array<double, 2>> &slice_range = {});
 
 }  // namespace isowave

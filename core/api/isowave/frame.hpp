@@ -56,8 +56,13 @@ struct Appearance {
   std::optional<Vector3> light_direction{};
   /// Rays from each hit towards that light, up to 255, that find out whether it is seen from there.
   /// 0: nothing casts a shadow; 1: hard shadows; more: soft ones. Each takes about as long as a
-  /// frame without any. Needs with_rays; not with FrameRequest::surfaces.
+  /// frame without any. Needs with_rays, and a surface of opacity 1.
   std::uint32_t shadow_rays = 0;
+  /// Least number of ambient rays, up to 255, if that light bounces: each hit then gets light that
+  /// comes by way of one other place of the surface, which has the surface's colour once more. Each
+  /// takes up to twice the time of an ambient ray. 0: it does not bounce. Needs with_bounce. Not
+  /// with surfaces and slices, nor in a team.
+  std::uint32_t bounce_rays = 0;
   /// Half of the angle that the light has in soft shadows [degrees], up to 45.
   double light_angle = 3;
   /// Pictures are RGBA with straight alpha: the share of a pixel's rays that hit, and the mean
@@ -72,10 +77,15 @@ struct Appearance {
   Vector3 color_axis{0, 0, 1};                      ///< world space, of any length above 0
   /// Colours are by the value of the renderer's field at a hit instead (RendererOptions::field),
   /// trilinear between its voxels. Hits without a value, outside its grid or without data, have
-  /// the surface's own colour. Not with FrameRequest::surfaces and time_budget_ms.
+  /// the surface's own colour. Not with time_budget_ms.
   bool color_by_field = false;
   /// With color_by_field: caps have the field's colours, and surfaces their own.
   bool color_caps_alone = false;
+  /// With color_by_field: the field's voxels are labels, exact whole numbers from 0 to 65,535, and
+  /// label L has colour L % 256 of the map. A hit has the label of the nearest voxel of its cell
+  /// with one other than 0, the background. If the field is the volume itself and the surfaces are
+  /// those of its labels, it has that of the nearest voxel with one of the surface's labels.
+  bool color_by_label = false;
   /// Distances, or values of the field, of the first and the last colour; none: the least and the
   /// largest of the volume's box [world units], or of the field at the frame's hits. In frames of
   /// several or translucent surfaces, a field's are those of its Volume::value_range().
@@ -86,7 +96,7 @@ struct Appearance {
   std::optional<double> slice_low{}, slice_high{};
 };
 
-/// The colour maps: viridis, magma, cividis, coolwarm, gray.
+/// The colour maps: viridis, magma, cividis, coolwarm, gray; and labels, for color_by_label.
 std::vector<std::string> color_map_names();
 
 /// The colour of a text: "#RRGGBB", or a name such as "bone", "skin" or "orange".
@@ -163,8 +173,8 @@ struct FrameRequest {
   /// back: what lies behind translucent surfaces is seen through them. At most 16 crossings of a
   /// ray are drawn (FrameStatistics::rays_cut). Empty: the surface of `isovalue` alone, opaque, in
   /// appearance.surface. A device needs RendererOptions::with_surfaces. Not with bound,
-  /// voxel_pixels, ambient_rays, shadow_rays, color_by_field, max_surface_error, time_budget_ms and
-  /// want_bounds; in a team, not with on_pass.
+  /// voxel_pixels, bounce_rays, max_surface_error, max_image_error, time_budget_ms and want_bounds;
+  /// in a team, nor with ambient_rays, shadow_rays and on_pass.
   std::vector<Surface> surfaces{};
   /// Slices beside `surfaces`, or beside that of `isovalue`: up to 8 with the surfaces, blended
   /// with them, with their conditions. A slice counts as a crossing, is in front of a surface at
@@ -179,7 +189,7 @@ struct FrameRequest {
   FieldBound bound = FieldBound::kNone;  ///< needs RendererOptions::with_bounds
   Normals normals = Normals::kSmooth;    ///< gradients of the hits; nothing else depends on them
   /// Rays from each hit, up to 255, that find out how much of the sky it sees, which shows depth.
-  /// Each takes about as long as a frame without any. Needs with_rays.
+  /// Each takes about as long as a frame without any. Needs with_rays, and a surface of opacity 1.
   std::uint32_t ambient_rays = 0;
   /// Largest distance to the true surface [pixels]. voxel_pixels and voxel_error are then chosen so
   /// that most pixels keep it. By proof, the true surface is that of the volume before compression;
@@ -188,9 +198,16 @@ struct FrameRequest {
   /// needs with_levels.
   std::optional<double> max_surface_error{};
   Evidence by = Evidence::kProof;  ///< for max_surface_error; kProof without one
-  /// Views that share max_surface_error: most pixels of all of them together keep it. Requests with
-  /// the same series and error are drawn with one detail, which is chosen once. Empty: the
-  /// request's view alone.
+  /// Largest error of the picture, above 0 and up to 1: the mean of FLIP's over all pixels, for a
+  /// viewer who sees 67 pixels a degree, against 64 rays a pixel at full detail. The cheapest rays
+  /// and voxel_pixels are then chosen that keep it with 95 % confidence, by tiles of the picture
+  /// without ambient, shadow and bounce rays. size.samples is the most rays along each axis, and
+  /// Frame::size tells how many were taken. Levels of detail need with_levels. A device's
+  /// renderer must be made for 65,536 rays or more. Not with max_surface_error.
+  std::optional<double> max_image_error{};
+  /// Views that share max_surface_error or max_image_error: most pixels of all of them together, or
+  /// the mean of their pictures, keep it. Requests with the same series and error are drawn with
+  /// one detail, which is chosen once. Empty: the request's view alone.
   std::vector<Camera> series{};
   /// Time in which the largest picture possible is drawn: first one that took at most half of it
   /// before, then larger ones. Needs with_time_budget.
@@ -273,6 +290,7 @@ void for_each_appearance_field(AnyAppearance &appearance, const Visit &visit) {
   visit("above", appearance.above);
   visit("light_direction", appearance.light_direction);
   visit("shadow_rays", appearance.shadow_rays);
+  visit("bounce_rays", appearance.bounce_rays);
   visit("light_angle", appearance.light_angle);
   visit("transparent", appearance.transparent);
   visit("color_map", appearance.color_map);
@@ -280,6 +298,7 @@ void for_each_appearance_field(AnyAppearance &appearance, const Visit &visit) {
   visit("color_axis", appearance.color_axis);
   visit("color_by_field", appearance.color_by_field);
   visit("color_caps_alone", appearance.color_caps_alone);
+  visit("color_by_label", appearance.color_by_label);
   visit("color_low", appearance.color_low);
   visit("color_high", appearance.color_high);
   visit("slice_map", appearance.slice_map);
@@ -312,6 +331,7 @@ void for_each_field(Request &request, const Visit &visit) {
   visit("ambient_rays", request.ambient_rays);
   visit("max_surface_error", request.max_surface_error);
   visit("by", request.by);
+  visit("max_image_error", request.max_image_error);
   visit("series", request.series);
   visit("time_budget_ms", request.time_budget_ms);
   visit("want_picture", request.want_picture);
@@ -343,6 +363,8 @@ struct FrameStatistics {
   /// The values of the first and the last colour: distances along Appearance::color_axis, or values
   /// of the field. None: there is no colour map, or no value.
   std::optional<std::array<double, 2>> color_range{};
+  /// Voxel values of the first and the last colour of slices; none: there are no slices.
+  std::optional<std::array<double, 2>> slice_range{};
   std::uint64_t uploaded_bytes = 0;               ///< from a compressed volume on the host
   std::uint32_t first_level = 0, last_level = 0;  ///< levels of detail that drew; 0: the finest
   /// Wall clock, from camera to the wanted arrays in the host's memory, without Frame::bounds.
@@ -365,12 +387,22 @@ struct SampledShare {
   double lowest = 0;
 };
 
-/// The detail that was chosen to keep FrameRequest::max_surface_error.
+/// A picture's error by tiles of it, for FrameRequest::max_image_error.
+struct ImageError {
+  std::uint32_t samples = 1;    ///< rays of a pixel along each axis, as chosen
+  std::uint32_t num_tiles = 0;  ///< of the picture, or of all views of a series
+  double mean = 0;              ///< of the tiles
+  /// Upper end of the one-sided confidence interval of 95 % (Student's t) for the whole picture.
+  double highest = 0;
+};
+
+/// The detail that was chosen to keep FrameRequest::max_surface_error or max_image_error.
 struct DetailChoice {
   double voxel_pixels = 0, voxel_error = 0;
-  bool reachable = true;  ///< false: this volume cannot keep it; full detail was drawn
-  std::string advice{};   ///< what would help if it is not reachable
+  bool reachable = true;                 ///< false: it cannot be kept; full detail was drawn
+  std::string advice{};                  ///< what would help if it is not reachable
   std::optional<SampledShare> sample{};  ///< by sample: with the chosen detail
+  std::optional<ImageError> image{};     ///< with max_image_error
 };
 
 /// A finished frame. Arrays that were not asked for are empty. Rays are [rows][columns], row 0 at
@@ -396,7 +428,7 @@ struct Frame {
   Array<float> bounds{};
 
   FrameStatistics statistics{};
-  std::optional<DetailChoice> detail{};  ///< if max_surface_error was given
+  std::optional<DetailChoice> detail{};  ///< if max_surface_error or max_image_error was given
 };
 
 /// Writes frame.picture: RGB, or RGBA if it is transparent.

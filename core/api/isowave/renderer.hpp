@@ -28,11 +28,12 @@ struct RendererOptions {
   bool with_bounds = false;       ///< frames may ask for bounds and max_surface_error
   bool with_time_budget = false;  ///< frames may have a time budget
   bool with_rays = false;         ///< frames may have ambient rays, and cast_rays() may be called
+  bool with_bounce = false;       ///< the same, and bounce_rays; 8 bytes a ray on a device
   /// Most FrameRequest::surfaces of a frame, 0 to 8. On a device, each takes 36 bytes a ray.
   std::uint32_t with_surfaces = 0;
   /// The volume is a segmentation: voxels are labels, exact integers from 0 to 65,535, and frames
   /// have surfaces of labels alone (Surface::labels). Needs with_surfaces; not with with_levels,
-  /// with_bounds, with_time_budget and a field. Other labels than those of the frame before decode
+  /// with_bounds and with_time_budget. Other labels than those of the frame before decode
   /// all blocks once. The host draws both without it.
   bool with_labels = false;
   /// A second volume for Appearance::color_by_field, of any grid. It gets up to half the memory.

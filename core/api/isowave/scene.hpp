@@ -9,7 +9,8 @@
 //    "surfaces": [{"isovalue": 500, "color": "skin", "opacity": 0.3},
 //                 {"isovalue": 1150, "color": "#f0e8d8"}],
 //    "clip": [{"normal": [0, 0, -1], "offset": -60}],
-//    "background": "black"}
+//    "background": "black",
+//    "annotations": {"scale_bar": true, "caption": true, "units": "mm"}}
 //
 // Its keys are the fields of Scene and of Appearance, except `surface`. A surface of labels has
 // "labels": [5, 7] instead of an isovalue. isowave_scene, surfaces, each isovalue, each normal of a
@@ -18,6 +19,10 @@
 // colours the surface by its values with
 //
 //    "field": "temperature.nrrd", "color_map": "magma", "color_by_field": true
+//
+// The keys of annotations are the fields of Annotations: scale_bar, axes, color_bar, caption, units
+// and title. Each annotation is left out unless it is true. A caption without a title gets the name
+// of the volume's file.
 
 #include <filesystem>
 #include <optional>
@@ -25,6 +30,7 @@
 #include <string_view>
 #include <vector>
 
+#include "isowave/annotations.hpp"
 #include "isowave/frame.hpp"
 
 namespace isowave {
@@ -43,6 +49,8 @@ struct Scene {
   std::vector<ClipPlane> clip{};  ///< as FrameRequest::clip
   bool caps = true;               ///< as FrameRequest::caps
   Appearance appearance{};        ///< without `surface`: surfaces have colours of their own
+  /// Drawn over the picture; none: nothing is. An empty title: the name of the volume's file.
+  std::optional<Annotations> annotations{};
 };
 
 /// Calls visit(name, field) for each field of a scene and its appearance, except `surface`. The
@@ -59,6 +67,7 @@ void for_each_scene_field(AnyScene &scene, const Visit &visit) {
   visit("clip", scene.clip);
   visit("caps", scene.caps);
   for_each_appearance_field(scene.appearance, visit);
+  visit("annotations", scene.annotations);
 }
 
 /// The scene of a JSON text.
@@ -78,8 +87,9 @@ Scene read_scene(const std::filesystem::path &path);
 void write_scene(const Scene &scene, const std::filesystem::path &path);
 
 /// A request that draws the scene. It has no size, and without Scene::camera no camera.
+/// annotation_layout() says where the scene's annotations are.
 FrameRequest scene_request(const Scene &scene);
-/// The scene that a request draws, without a volume and a field.
+/// The scene that a request draws, without a volume, a field and annotations.
 Scene scene_of(const FrameRequest &request);
 
 }  // namespace isowave

@@ -15,6 +15,7 @@ from isowave import _loader
 
 _loader.prepare()
 
+from isowave._annotate import Annotations  # noqa: E402
 from isowave._bricks import BrickRenderer  # noqa: E402
 from isowave._camera import Camera  # noqa: E402
 from isowave._clip import ClipPlane, clip_box  # noqa: E402
@@ -36,6 +37,7 @@ from isowave._volume import Volume  # noqa: E402
 from isowave.viewer import view  # noqa: E402
 
 __all__ = [
+    "Annotations",
     "BrickRenderer",
     "Camera",
     "ClipPlane",

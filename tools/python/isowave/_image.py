@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from isowave import _core
+from isowave._annotate import Annotations, annotated
 from isowave._checked import flag
 from isowave._request import Request, rgb_of
 from isowave._surface import Surface
@@ -59,7 +61,9 @@ class Image:
         self.camera = request.camera
         self.isovalue = request.isovalue  #: the first surface's
         self.surfaces = tuple(request.surfaces)  #: with their colours; (): the isovalue's, opaque
-        self._samples = request.samples
+        #: Those of the scene that was drawn, which annotated() draws; None: there are none.
+        self.annotations: Annotations | None = None
+        self._samples = self.statistics.get("detail", {}).get("samples", request.samples)
         self._background = WHITE if request.background is None else request.background
         self._background_top = request.background_top
         self._fields = request.for_core()
@@ -101,38 +105,39 @@ class Image:
         return np.dstack((rgb, np.rint(255 * covered).astype(np.uint8)))
 
     def annotated(
-        self, what: str | Sequence[str] = "all", *, units: str = "", title: str = ""
+        self,
+        what: str | Sequence[str] | None = None,
+        *,
+        units: str | None = None,
+        title: str | None = None,
     ) -> npt.NDArray[np.uint8]:
         """A copy of the picture with a scale bar and more, (height, width, 3), or 4 with alpha.
 
         The arrays of the image stay as they are. Needs Pillow: pip install 'isowave[annotations]'.
+        An argument that is None is that of the scene's annotations, if a scene with some was drawn.
 
         Parameters
         ----------
         what
             "scale-bar": a round length at the depth of the point that the camera looks at; "axes":
-            directions of x, y and z; "color-bar" of the colour map; "caption": title, isovalues and
-            their colours; "all" of them, or a list of these names.
+            directions of x, y and z; "color-bar" of colour map and slices; "caption": title,
+            isovalues and their colours; "all" of them, or a list of these names. Default: "all".
         units
             Units of the world, such as "mm": for the scale bar, and for colours along an axis.
+            Default: none.
         title
-            First line of the caption, such as the name of the volume's file.
+            First line of the caption, such as the name of the volume's file. Default: none.
 
         Raises
         ------
         Error
-            The picture has less than 200 x 150 pixels; a colour bar without a colour map.
+            The picture has less than 200 x 150 pixels; a colour bar without colour map and slices.
         """
-        from isowave._annotate import annotations_of, draw
-
-        wanted = annotations_of(
-            what,
-            units,
-            title,
-            bool(self._fields.get("color_map") or self._fields.get("color_table")),
-        )
-        groups = _core.annotation_layout(wanted, self._fields, self.statistics.get("color_range"))
-        return draw(self._drawn(), groups)
+        arguments = {"what": what, "units": units, "title": title}
+        given: dict[str, Any] = {name: each for name, each in arguments.items() if each is not None}
+        wanted = replace(self.annotations or Annotations(), **given)
+        ranges = (self.statistics.get("color_range"), self.statistics.get("slice_range"))
+        return annotated(self._drawn(), self._fields, ranges, wanted)
 
     def _background_rows(self, rows: int) -> npt.NDArray[np.float64]:
         """(rows, 3): the background at each row, from the top."""

@@ -31,6 +31,7 @@ CAPABILITIES: dict[str, int] = {
     "bounds": False,
     "time_budget": False,
     "rays": False,
+    "bounce": False,
     "labels": False,
     "surfaces": 0,
 }
@@ -123,11 +124,13 @@ class Renderer:
     levels, bounds, time_budget, rays
         Whether frames may use levels of detail; ask for `max_error` and bounds; have a
         `time_budget`; have `ambient` rays, and cast_rays() may be called. On the host they may.
+    bounce
+        The same as rays, and frames may have `bounce_rays`. On the host they may.
     surfaces
         How many `surfaces` frames may have, up to 8. Frames of the host may have 8.
     labels
         A device's frames have surfaces of labels alone, Surface(labels=...). Needs surfaces=; not
-        with levels, bounds, time_budget and field. Other labels than those of the frame
+        with levels, bounds and time_budget. Other labels than those of the frame
         before decode all blocks once. Frames of the host may have either.
     field
         A second volume, of any grid, that ColorMap(by="field") colours surfaces by. It is read at
@@ -155,14 +158,15 @@ class Renderer:
         bounds: bool = False,
         time_budget: bool = False,
         rays: bool = False,
+        bounce: bool = False,
         labels: bool = False,
         surfaces: int = 0,
         field: Voxels | None = None,
         profiling: bool = False,
         quick: bool = False,
     ) -> None:
-        can = {"levels": levels, "bounds": bounds, "time_budget": time_budget, "rays": rays}
-        can["labels"] = labels
+        can = {"levels": levels, "bounds": bounds, "time_budget": time_budget, "labels": labels}
+        can |= {"rays": rays or bounce, "bounce": bounce}
         options = renderer_options(
             size, samples, memory_budget, cache_blocks, surfaces=surfaces, **can
         )
@@ -271,6 +275,7 @@ class Renderer:
         light: Sequence[float] | None = None,
         shadow_rays: int = 0,
         light_angle: float = 3.0,
+        bounce_rays: int = 0,
         transparent: bool = False,
         normals: str = "smooth",
         clip: Sequence[ClipPlane] = (),
@@ -281,6 +286,7 @@ class Renderer:
         outputs: Sequence[str] = ALL_OUTPUTS,
         max_error: float | None = None,
         by: str = "proof",
+        max_image_error: float | None = None,
         series: Sequence[Camera] = (),
         voxel_pixels: float = 0.0,
         voxel_error: float = 0.0,
@@ -299,7 +305,8 @@ class Renderer:
         size
             Width and height [pixels]; None: the renderer's largest.
         samples
-            Rays per pixel along each axis, 1 to 8; colours are their mean.
+            Rays per pixel along each axis, 1 to 8; colours are their mean. With max_image_error the
+            most that may be chosen: 4 often suffice.
         color, background, color_map
             Colours of surface and background: "#rrggbb", a name as "bone", or three numbers 0 to 1.
             A ColorMap colours surfaces by the distance along an axis, or by the renderer's field.
@@ -314,7 +321,12 @@ class Renderer:
         shadow_rays, light_angle
             Rays from each hit towards that light, up to 255: 1 gives hard shadows, 16 and more soft
             ones, of a light with half that angle [degrees, up to 45]. Each takes about as long as a
-            frame without any. Needs rays=True; not with surfaces.
+            frame without any. Needs rays=True.
+        bounce_rays
+            Least number of ambient rays, up to 255, if that light bounces: each hit then gets light
+            of it by way of one other place of the surface. 16 and more give smooth pictures. Each
+            takes up to twice the time of an ambient ray. Needs bounce=True; not with surfaces and
+            slices, nor of bricks.
         transparent
             Draws `rgba` instead of `rgb`, without a background: see Image.rgba.
         normals
@@ -340,8 +352,15 @@ class Renderer:
         by
             "proof" of max_error, against the volume before compression, which needs bounds=True; or
             "sample": 99 % of the hits keep it, against full detail. Needs levels=True.
+        max_image_error
+            Largest error of the picture, above 0 and up to 1: the mean of FLIP's over all pixels,
+            against 64 rays a pixel at full detail. The cheapest rays and voxel_pixels are chosen
+            that keep it with 95 % confidence, by tiles of the picture without ambient, shadow and
+            bounce rays. Arrays then have statistics["detail"]["samples"] as many rows and columns.
+            Levels of detail need levels=True. Not with max_error.
         series
-            Views, as of a movie, that share max_error: most hits of all of them together keep it.
+            Views, as of a movie, that share max_error or max_image_error: most hits of all of them
+            together, or the mean of their pictures, keep it.
         voxel_pixels, voxel_error
             Largest distance between voxels of coarser levels [pixels], which needs levels=True, and
             largest difference of decoded voxels from the compressed ones [voxel values]; 0: none.

@@ -94,6 +94,7 @@ class Request:
     light: Sequence[float] | None = None
     shadow_rays: int = 0
     light_angle: float = 3.0
+    bounce_rays: int = 0
     transparent: bool = False
     normals: str = "smooth"
     clip: Sequence[ClipPlane] = ()
@@ -104,6 +105,7 @@ class Request:
     outputs: Sequence[str] = ALL_OUTPUTS
     max_error: float | None = None
     by: str = "proof"
+    max_image_error: float | None = None
     series: Sequence[Camera] = ()
     voxel_pixels: float = 0.0
     voxel_error: float = 0.0
@@ -129,6 +131,7 @@ class Request:
             "light": None if self.light is None else vector(numbers("light", self.light, 3)),
             "shadow_rays": whole("shadow_rays", self.shadow_rays),
             "light_angle": number("light_angle", self.light_angle),
+            "bounce_rays": whole("bounce_rays", self.bounce_rays),
             "transparent": flag("transparent", self.transparent),
             "normals": normals_of(self.normals),
             "clip": clip_of(self.clip),
@@ -139,6 +142,7 @@ class Request:
             "outputs": outputs,
             "max_error": optional("max_error", self.max_error),
             "by": evidence_of(self.by),
+            "max_image_error": optional("max_image_error", self.max_image_error),
             "series": series_of(self.series),
             "voxel_pixels": number("voxel_pixels", self.voxel_pixels),
             "voxel_error": number("voxel_error", self.voxel_error),
@@ -189,10 +193,10 @@ class Request:
         return "field" in self.outputs or (color_map is not None and color_map.by != "axis")
 
     @property
-    def shows_caps(self) -> bool:
-        """Whether caps show a field."""
+    def shows_volume(self) -> bool:
+        """Whether the field is the volume itself, unless there is another."""
         color_map = color_map_of(self.color_map)
-        return color_map is not None and color_map.by == "caps"
+        return color_map is not None and color_map.by in ("caps", "labels")
 
     @property
     def needs(self) -> dict[str, str]:
@@ -211,6 +215,7 @@ class Request:
                 "ambient" if self.ambient else "shadow_rays",
                 self.ambient != 0 or self.shadow_rays != 0,
             ),
+            "bounce": ("bounce_rays", self.bounce_rays != 0),
         }
         return {option: argument for option, (argument, is_asked) in asked.items() if is_asked}
 
@@ -231,6 +236,7 @@ class Request:
             "light_direction": self.light,
             "shadow_rays": self.shadow_rays,
             "light_angle": self.light_angle,
+            "bounce_rays": self.bounce_rays,
             "transparent": self.transparent,
             "normals": self.normals,
             "clip": [{"normal": plane.normal, "offset": plane.offset} for plane in self.clip],
@@ -242,6 +248,7 @@ class Request:
             "voxel_error": self.voxel_error,
             "max_surface_error": self.max_error,
             "by": self.by,
+            "max_image_error": self.max_image_error,
             "series": [camera_for_core(camera) for camera in self.series],
             "time_budget_ms": None if self.time_budget is None else 1000 * self.time_budget,
             "ambient_rays": self.ambient,

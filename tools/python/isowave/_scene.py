@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 from isowave import _core
+from isowave._annotate import Annotations, annotations_for_core
 from isowave._camera import Camera, vector
 from isowave._checked import Isovalue, number
 from isowave._clip import ClipPlane, clip_of
@@ -31,6 +32,7 @@ LOOK = (
     "light",
     "shadow_rays",
     "light_angle",
+    "bounce_rays",
 )
 
 
@@ -62,7 +64,7 @@ class Scene:
     surfaces: tuple[Surface, ...] = ()
     slices: tuple[Slice, ...] = ()
     planes: tuple[ClipPlane, ...] = ()  #: clipping planes
-    caps: bool = True  #: as the argument of Volume.render(), and the next ten
+    caps: bool = True  #: as the argument of Volume.render(), and the next eleven
     slice_map: ColorMap | str = "gray"
     color_map: ColorMap | str | None = None
     background: Color | None = None
@@ -72,8 +74,10 @@ class Scene:
     light: Sequence[float] | None = None
     shadow_rays: int = 0
     light_angle: float = 3.0
+    bounce_rays: int = 0
     field: Voxels | None = None
     view: Camera | None = None  #: None: a view that the surfaces fill
+    annotations: Annotations | None = None  #: what Image.annotated() draws over pictures
 
     def surface(
         self,
@@ -131,12 +135,25 @@ class Scene:
             raise TypeError(f"look() has no argument {', '.join(sorted(unknown))}")
         return replace(self, **fields)
 
+    def annotate(
+        self, what: str | Sequence[str] = "all", *, units: str = "", title: str = ""
+    ) -> Scene:
+        """The scene with other annotations; arguments as Image.annotated(). what=(): none.
+
+        Image.annotated() draws them over the scene's picture; rgb and save() are without them.
+        """
+        annotations = Annotations(what, units, title)
+        return replace(self, annotations=annotations if annotations.what else None)
+
     def camera(self, **more: Any) -> Camera:
         """A view that the surfaces fill; arguments as Volume.camera()."""
         return self.volume.camera(surfaces=self.surfaces, **more)
 
     def render(self, **more: Any) -> Image:
-        """Draws the scene; arguments as Volume.render(), which replace those of the scene."""
+        """Draws the scene; arguments as Volume.render(), which replace those of the scene.
+
+        Image.annotated() draws the annotations.
+        """
         arguments: dict[str, Any] = {
             "slices": self.slices,
             "clip": self.planes,
@@ -159,7 +176,9 @@ class Scene:
             arguments["color"] = None if by_axis else first.color
         else:
             arguments["surfaces"] = self.surfaces
-        return self.volume.render(**arguments | more)
+        image = self.volume.render(**arguments | more)
+        image.annotations = self.annotations
+        return image
 
     def save(
         self,
@@ -197,8 +216,9 @@ def scene_fields(scene: Scene) -> dict[str, Any]:
     color_map = color_map_of(scene.color_map)
     field: Any = scene.field
     shows_volume = field is scene.volume or (
-        field is None and color_map is not None and color_map.by == "caps"
+        field is None and color_map is not None and color_map.by in ("caps", "labels")
     )
+    has_bar = bool(scene.slices) or (color_map is not None and color_map.by != "labels")
     return {
         "field": "volume" if shows_volume else None,
         "camera": None if scene.view is None else camera_for_core(camera_of(scene.view)),
@@ -215,4 +235,8 @@ def scene_fields(scene: Scene) -> dict[str, Any]:
         "light_direction": None if scene.light is None else vector(scene.light),
         "shadow_rays": scene.shadow_rays,
         "light_angle": scene.light_angle,
+        "bounce_rays": scene.bounce_rays,
+        "annotations": None
+        if scene.annotations is None
+        else annotations_for_core(scene.annotations, has_bar),
     }

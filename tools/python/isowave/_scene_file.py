@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from isowave import _core
+from isowave._annotate import Annotations, annotations_from_core
 from isowave._camera import Camera, vector
 from isowave._clip import ClipPlane
 from isowave._color_map import ColorMap
@@ -37,6 +40,8 @@ def open_scene(
         The second volume, if colours are by one. None: the one that the file names, opened with
         the `options` of compression.
 
+    If the volume is opened here, annotations without a title get the name of its file.
+
     Raises
     ------
     Error
@@ -49,9 +54,11 @@ def open_scene(
         raise _core.Error(f"{os.fsdecode(path)}: it names no field: give field=")
     if wants_field and fields["field"] != "volume":
         field = open_field(fields["field"], options)
+    title = ""
     if volume is None:
         if not fields["volume"]:
             raise _core.Error(f"{os.fsdecode(path)}: it names no volume: give volume=")
+        title = Path(fields["volume"]).name
         volume = open_volume(fields["volume"], **options)
     elif options:
         raise TypeError(f"{', '.join(options)}: the volume is open already")
@@ -84,8 +91,10 @@ def open_scene(
         optional_vector(fields["light_direction"]),
         fields["shadow_rays"],
         fields["light_angle"],
+        fields["bounce_rays"],
         drawn if wants_field and field is None else field,
         camera_of_scene(fields["camera"]),
+        annotations_of_scene(fields["annotations"], title),
     )
 
 
@@ -110,8 +119,16 @@ def color_map_of_scene(fields: dict[str, Any]) -> ColorMap | None:
         colors,
         vector(fields["color_axis"]),
         None if low is None else (low, high),
-        ("caps" if fields["color_caps_alone"] else "field") if fields["color_by_field"] else "axis",
+        colors_by(fields),
     )
+
+
+def colors_by(fields: dict[str, Any]) -> str:
+    if not fields["color_by_field"]:
+        return "axis"
+    if fields["color_by_label"]:
+        return "labels"
+    return "caps" if fields["color_caps_alone"] else "field"
 
 
 def slice_map_of_scene(fields: dict[str, Any]) -> ColorMap:
@@ -119,6 +136,14 @@ def slice_map_of_scene(fields: dict[str, Any]) -> ColorMap:
     return ColorMap(
         fields["slice_table"] or fields["slice_map"], range=None if low is None else (low, high)
     )
+
+
+def annotations_of_scene(fields: dict[str, Any] | None, title: str) -> Annotations | None:
+    """title: if the scene gives none."""
+    if fields is None:
+        return None
+    found = annotations_from_core(fields)
+    return replace(found, title=found.title or title)
 
 
 def camera_of_scene(fields: dict[str, Any] | None) -> Camera | None:

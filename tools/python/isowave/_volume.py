@@ -33,6 +33,9 @@ from isowave._scene import Scene
 from isowave._surface import Surface
 
 
+NEED_LEVELS = {"levels", "bounds", "time_budget"}  # options with which levels may be drawn
+
+
 class Turns:
     """A lock for calls that take turns. A call from another call's on_pass gets an Error."""
 
@@ -185,11 +188,12 @@ class Volume(Voxels):
         wanted: dict[str, Any] = {"device": device, "memory_budget": memory_budget}
         wanted |= {"size": request.size, **dict.fromkeys(request.needs, True)}
         wanted["surfaces"] = request.num_surfaces
-        if field is None and request.shows_caps:
+        if field is None and request.shows_volume:
             field = self
         if field is not None:
             wanted["field"] = field
-        wanted["levels"] = not {"levels", "bounds", "time_budget"}.isdisjoint(request.needs)
+        chooses = request.max_image_error is not None and self.num_levels > 1
+        wanted["levels"] = chooses or not NEED_LEVELS.isdisjoint(request.needs)
         if request.samples != 1:
             wanted["samples"] = request.samples
         with self._lock:

@@ -124,6 +124,17 @@ def rests(page: Any) -> None:
     )
 
 
+def asked(page: Any, volume: FakeVolume) -> Any:
+    """The request of the last picture."""
+    rests(page)
+    drawn = (frame.request for frame in reversed(volume.frames))
+    return next(request for request in drawn if request.outputs == ("rgb",))  # not of bounds
+
+
+def button(page: Any, name: str) -> Any:
+    return page.get_by_role("button", name=name, exact=True)
+
+
 @pytest.fixture
 def page(open_page: Callable[..., Any], server: Server) -> Any:
     page = open_page()
@@ -180,6 +191,28 @@ def screenshot(page: Any) -> tuple[str, bytes]:
             return files[0].name, files[0].read_bytes()
         time.sleep(0.1)
     raise TimeoutError("no download")
+
+
+def open_file(page: Any, name: str, text: str) -> None:
+    page.get_by_label("Scene file").set_input_files(
+        {"name": name, "mimeType": "application/json", "buffer": text.encode()}
+    )
+
+
+def open_scene(page: Any, text: str) -> None:
+    """Opens a file that is read, and waits for its wish."""
+    wish = page.evaluate("document.querySelector('main').dataset.wish")
+    open_file(page, "scene.json", text)
+    page.wait_for_function(
+        "(before) => document.querySelector('main').dataset.wish !== before", arg=wish
+    )
+
+
+def saved_scene(page: Any) -> str:
+    with page.expect_download() as saved:
+        page.get_by_role("button", name="Save scene").click()
+    assert saved.value.suggested_filename == "scene.json"
+    return Path(saved.value.path()).read_text()
 
 
 def changes(page: Any, act: Callable[[], None]) -> bool:

@@ -5,12 +5,13 @@ import subprocess
 import sys
 
 import numpy as np
+import PIL.ImageFont
 import pytest
 from conftest import FUEL
 
 import isowave
 from isowave import _core
-from isowave._annotate import annotations_of
+from isowave._annotate import annotations_for_core
 
 SIZE = (320, 240)
 
@@ -25,9 +26,10 @@ def draw(volume, **more):
 
 
 def groups_of(image, what="all", **more):
-    has_map = bool(image._fields.get("color_map"))
-    wanted = annotations_of(what, more.get("units", ""), more.get("title", ""), has_map)
-    return _core.annotation_layout(wanted, image._fields, image.statistics["color_range"])
+    has_bar = bool(image._fields.get("color_map") or image._fields.get("slices"))
+    wanted = annotations_for_core(isowave.Annotations(what, **more), has_bar)
+    ranges = (image.statistics["color_range"], image.statistics["slice_range"])
+    return _core.annotation_layout(wanted, image._fields, *ranges)
 
 
 @pytest.mark.parametrize(
@@ -69,6 +71,22 @@ def test_the_scale_bar_is_as_long_as_it_says(volume):
     assert (points[2][0] - points[1][0]) * 60 / 240 == pytest.approx(20)
 
 
+def test_slices_have_a_bar_of_their_own(volume):
+    """At the place of the only bar, or below that of the surfaces."""
+    z = isowave.Slice("z", 16)
+    alone = draw(volume, slices=[z], slice_map=isowave.ColorMap("magma", range=(10, 90)))
+    assert alone.statistics["slice_range"] == (10, 90)
+    assert draw(volume).statistics["slice_range"] is None
+    (bar,) = groups_of(alone, "color-bar")
+    assert "slices" in {text[3] for text in bar["texts"]}
+    image = draw(volume, slices=[z], color_map="gray")
+    upper, lower = groups_of(image, "color-bar")
+    assert upper["end"][1] <= lower["begin"][1]
+    assert "z" in {text[3] for text in upper["texts"]}
+    assert "slices" in {text[3] for text in lower["texts"]}
+    assert len(groups_of(image)) == 5
+
+
 def test_color_ranges_are_those_of_the_picture(volume):
     image = draw(volume, color_map=isowave.ColorMap("gray", "x", (2, 9)))
     assert image.statistics["color_range"] == (2, 9)
@@ -90,12 +108,48 @@ def test_names_choose_what_is_drawn(volume):
     assert np.array_equal(image.annotated(()), image.rgb)
 
 
+def test_scenes_say_what_is_drawn_over_their_pictures(volume):
+    scene = volume.scene().surface(40).annotate(["axes", "caption"], units="mm", title="fuel")
+    image = scene.render(size=SIZE, device="host")
+    assert image.annotations == scene.annotations
+    assert image.annotations == isowave.Annotations(("axes", "caption"), "mm", "fuel")
+    plain = draw(volume)
+    assert np.array_equal(image.rgb, plain.rgb), "without annotations"
+    own = plain.annotated(["axes", "caption"], units="mm", title="fuel")
+    assert np.array_equal(image.annotated(), own)
+    # Arguments come in the place of the scene's.
+    assert np.array_equal(image.annotated("caption"), plain.annotated("caption", title="fuel"))
+    bar = plain.annotated("scale-bar", units="km")
+    assert np.array_equal(image.annotated("scale-bar", units="km"), bar)
+    assert np.array_equal(image.annotated(title=""), plain.annotated(["axes", "caption"]))
+    assert np.array_equal(image.annotated(()), plain.rgb)
+    none = scene.annotate(()).render(size=SIZE, device="host")
+    assert none.annotations is None and np.array_equal(none.annotated(), plain.annotated())
+
+
+def test_letters_that_pillow_lacks_are_those_of_a_font_of_the_system(volume):
+    try:
+        PIL.ImageFont.truetype("DejaVuSans.ttf", 10)
+    except OSError:
+        pytest.skip("no DejaVu fonts are installed")
+    image = draw(volume)
+    micro, angstrom = (image.annotated("scale-bar", units=units) for units in ("µm", "Åm"))
+    assert not np.array_equal(micro, angstrom), "both were the sign of a missing letter"
+
+
 def test_what_cannot_be_is_one_line(volume, monkeypatch):
     image = draw(volume)
     with pytest.raises(ValueError, match="what axis: there are scale-bar, axes, color-bar, capt"):
         image.annotated("axis")
     with pytest.raises(TypeError, match="units=3: give a text"):
         image.annotated(units=3)
+    for give in (volume.scene().annotate, isowave.Annotations):
+        with pytest.raises(ValueError, match="what axis: there are scale-bar, axes, color-bar"):
+            give("axis")
+        with pytest.raises(TypeError, match="title=3: give a text"):
+            give(title=3)
+        with pytest.raises(TypeError, match="what=3: give a sequence of names"):
+            give(3)
     with pytest.raises(isowave.Error, match="a colour bar needs a colour map"):
         image.annotated("color-bar")
     small = volume.render(40, size=(64, 48), device="host")
@@ -118,8 +172,19 @@ def test_what_cannot_be_is_one_line(volume, monkeypatch):
 def test_the_packages_program_has_no_cairo(tmp_path):
     """The wheel stays small."""
     code = "import sys; from isowave._program import main; sys.exit(main())"
-    command = [sys.executable, "-c", code, "render", FUEL, "-i", "40", "--device", "host"]
-    options = ["--annotate", "all", "-o", tmp_path / "a.png"]
-    run = subprocess.run([*command, *options], capture_output=True, text=True)
-    assert run.returncode == 1 and not [*tmp_path.iterdir()]
-    assert run.stderr == "isowave: --annotate: this isowave was built without Cairo: leave it out\n"
+    command = [sys.executable, "-c", code, "render", FUEL, "--device", "host"]
+    picture, scene = tmp_path / "a.png", tmp_path / "scene.json"
+    isowave.open(FUEL).scene().surface(40).annotate("axes").save(scene)
+
+    def run(*options):
+        return subprocess.run([*command, *options], capture_output=True, text=True)
+
+    for options in (["-i", "40", "--annotate", "all"], ["--scene", scene]):
+        done = run(*options, "-o", picture)
+        assert done.returncode == 1 and not picture.exists()
+        assert done.stderr == (
+            "isowave: annotations: this isowave was built without Cairo: leave out --annotate, "
+            "or give --annotate none\n"
+        )
+    assert run("--scene", scene, "-o", picture, "--annotate", "none").returncode == 0
+    assert run("--scene", scene, "--depth", tmp_path / "d.npy").returncode == 0

@@ -148,6 +148,11 @@ def test_a_field_colours_several_surfaces(volume):
         pictures.add(drawn[0][0])
     assert len(pictures) == 3
     assert drawn[0][0] == draw(own)[0]
+    for device in ("cpu", "host"):
+        seen: list[bytes] = []  # after each pass
+        keep = lambda progress: seen.append(progress.rgb.tobytes())  # noqa: E731
+        whole, _ = draw([skin, bone], device=device, color_map=by_field, on_pass=keep)
+        assert seen[-1] == whole
     given = replace(by_field, range=(low, high))
     assert draw([skin, bone], color_map=given)[0] in pictures
     wider = replace(given, range=(low, high + 9))
@@ -184,5 +189,5 @@ def test_fields_are_refused_in_one_line(volume):
             renderer.render(6, **arguments)
     with pytest.raises(TypeError, match="field"):
         volume.renderer(size=SIZE, field="other")
-    with pytest.raises(ValueError, match="axis, field and caps"):
+    with pytest.raises(ValueError, match="axis, field, caps, labels"):
         renderer.render(6, color_map=isowave.ColorMap(by="time"))

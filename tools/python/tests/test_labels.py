@@ -59,6 +59,33 @@ def test_a_volume_draws_labels_and_isosurfaces_in_turn(volume: isowave.Volume) -
     assert first.depth is not None and np.isfinite(first.depth).any() and again.rgb is not None
 
 
+def test_surfaces_have_colours_by_label(volume: isowave.Volume, tmp_path: Path) -> None:
+    """Light alone is left out: each pixel of the surface has the colour of one of its labels."""
+    colors = np.zeros((256, 3))
+    colors[3], colors[255], colors[7] = (1, 0, 0), (0, 1, 0), (0, 0, 1)
+    by_label = isowave.ColorMap(colors, by="labels")
+    flat = {"lights": {"ambient": 1, "diffuse": 0, "specular": 0, "above": 0}}
+    scene = volume.scene().labels([3, 65535, 7]).look(color_map=by_label, **flat)
+    image = scene.render(size=SIZE, device="cpu")
+    assert image.rgb is not None and image.depth is not None
+    seen = {tuple(color) for color in image.rgb[np.isfinite(image.depth)]}
+    assert seen == {(255, 0, 0), (0, 255, 0), (0, 0, 255)}
+    assert (scene.render(size=SIZE, device="host").rgb == image.rgb).all()
+    scene.save(tmp_path / "scene.json")
+    opened = isowave.open_scene(tmp_path / "scene.json", volume=volume)
+    assert (opened.render(size=SIZE).rgb == image.rgb).all()
+    named = volume.render(surfaces=[Surface(labels=3)], color_map=isowave.ColorMap(by="labels"))
+    assert named.rgb is not None
+    with pytest.raises(ValueError, match="there are axis, field, caps, labels"):
+        volume.render(3, color_map=isowave.ColorMap(by="label"))
+
+
+def test_colours_by_what_is_no_label_are_one_line(volume: isowave.Volume) -> None:
+    heat = isowave.compress(np.zeros((5, 5, 5), np.float32))
+    with pytest.raises(isowave.Error, match="the field's voxels are no labels"):
+        volume.render(1, size=SIZE, field=heat, color_map=isowave.ColorMap(by="labels"))
+
+
 def test_one_renderer_draws_other_labels(volume: isowave.Volume) -> None:
     renderer = volume.renderer(size=SIZE, surfaces=2, labels=True)
     camera = renderer.camera(surfaces=[Surface(labels=[3, 65535])])
@@ -130,10 +157,10 @@ def test_volumes_that_are_no_segmentation_are_refused(voxels: np.ndarray) -> Non
         plain.render(surfaces=[Surface(labels=3)])
 
 
-def test_the_viewer_refuses_scenes_of_labels(volume: isowave.Volume, tmp_path: Path) -> None:
+def test_the_viewer_takes_scenes_of_labels(volume: isowave.Volume, tmp_path: Path) -> None:
     pytest.importorskip("simplejpeg")
     from isowave.viewer import messages
 
     volume.scene().labels(3).save(tmp_path / "scene.json")
     answer = messages.scene((tmp_path / "scene.json").read_text())
-    assert answer["type"] == "error" and "the viewer draws no labels" in str(answer)
+    assert answer["type"] == "scene" and answer["fields"]["surfaces"][0]["labels"] == [3]

@@ -405,6 +405,25 @@ def test_an_error_is_kept_by_sample():
         renderer.render(10, series=series)
 
 
+def test_an_error_of_the_picture_is_kept():
+    volume = isowave.compress(sphere_voxels((40, 44, 48)), tolerance=0.001, levels=0)
+    image = volume.render(10, size=SIZE, samples=4, max_image_error=0.05)
+    detail = image.statistics["detail"]
+    samples = detail["samples"]
+    assert detail["reachable"] and 1 <= samples <= 4 and detail["tiles"] >= 12
+    assert 0 < detail["flip"] <= detail["highest_flip"] <= 0.05
+    assert image.rgb.shape == (48, 64, 3)
+    assert image.depth.shape == (48 * samples, 64 * samples)
+    assert image.rgba.shape == (48, 64, 4)
+    chosen = {"samples": samples, "voxel_pixels": detail["voxel_pixels"]}
+    assert np.array_equal(volume.render(10, size=SIZE, **chosen).rgb, image.rgb)
+    beyond = volume.render(10, size=SIZE, max_image_error=1e-6).statistics["detail"]
+    assert not beyond["reachable"] and "up to 8 x 8" in beyond["advice"]
+    for argument in ({"max_error": 1.0}, {"time_budget": 1.0}, {"voxel_pixels": 1.0}):
+        with pytest.raises(isowave.Error):
+            volume.render(10, size=SIZE, max_image_error=0.05, **argument)
+
+
 def test_bad_requests_are_one_line(volume, renderer):
     cases = [
         lambda: renderer.render(float("nan")),

@@ -54,6 +54,7 @@ FIELDS: dict[str, Any] = {
     "light_direction": (0, 1, 2),
     "shadow_rays": 7,
     "light_angle": 4,
+    "bounce_rays": 3,
     "transparent": False,
     "normals": "cell",
     "clip": [{"normal": (0, 0, 2), "offset": 3}],
@@ -68,6 +69,7 @@ FIELDS: dict[str, Any] = {
     "voxel_error": 3,
     "max_surface_error": 1,
     "by": "sample",
+    "max_image_error": 0.25,
     "series": 2
     * [
         {
@@ -103,6 +105,7 @@ def test_arguments_reach_the_request_by_their_names(monkeypatch: pytest.MonkeyPa
         "light": (0.0, 1.0, 2.0),
         "shadow_rays": 7,
         "light_angle": 4.0,
+        "bounce_rays": 3,
         "transparent": False,
         "normals": "cell",
         "clip": (isowave.ClipPlane((0.0, 0.0, 2.0), 3.0),),
@@ -113,6 +116,7 @@ def test_arguments_reach_the_request_by_their_names(monkeypatch: pytest.MonkeyPa
         "outputs": ("rgb", "bounds"),
         "max_error": 1.0,
         "by": "sample",
+        "max_image_error": 0.25,
         "series": (CAMERA, CAMERA),
         "voxel_pixels": 2.0,
         "voxel_error": 3.0,
@@ -176,6 +180,7 @@ def test_values_are_python_s_own() -> None:
             "outputs a: there are rgb, depth, normals, position, bounds, surface, cap, field",
         ),
         ("max_error", "1", "max_error='1': give a number"),
+        ("max_image_error", "small", "max_image_error='small': give a number"),
         ("by", "luck", "by 'luck': give 'proof' or 'sample'"),
         ("voxel_pixels", None, "voxel_pixels=None: give a number"),
         ("voxel_error", True, "voxel_error=True: give a number"),

@@ -25,18 +25,20 @@ def ball() -> isowave.Volume:
 
 def two(ball: isowave.Volume) -> isowave.Scene:
     scene = ball.scene().surface(1, "#3060c0", opacity=0.5).surface(5, (0.1, 0.2, 0.3))
-    return scene.clip(HALF, caps=False).seen_from(CAMERA)
+    return scene.clip(HALF, caps=False).seen_from(CAMERA).annotate("caption", title="two")
 
 
 def one(ball: isowave.Volume) -> isowave.Scene:
     scene = ball.scene().surface(3, "orange").look(background="black", lights={"above": 0.9})
-    scene = scene.look(light=(1, 2, 1), shadow_rays=2, light_angle=5.0, background_top="skin")
+    scene = scene.look(light=(1, 2, 1), shadow_rays=2, light_angle=5.0, bounce_rays=2)
+    scene = scene.look(background_top="skin")
     return scene.seen_from(dataclasses.replace(CAMERA, parallel_height=20.0))
 
 
 def mapped(ball: isowave.Volume) -> isowave.Scene:
     color_map = isowave.ColorMap("magma", (1, 1, 0), (3.5, 20.0))
-    return ball.scene().surface(3).look(color_map=color_map, transparent=True)
+    scene = ball.scene().surface(3).look(color_map=color_map, transparent=True)
+    return scene.annotate(units="µm")
 
 
 def by_own_caps(ball: isowave.Volume) -> isowave.Scene:
@@ -60,6 +62,43 @@ def test_files_keep_what_is_drawn(ball: isowave.Volume, make: Any, tmp_path: pat
     text = (tmp_path / "again.json").read_text()
     assert text == (tmp_path / "scene.json").read_text()
     assert json.loads(text)["isowave_scene"] == 1
+
+
+def test_annotations_are_kept(ball: isowave.Volume, tmp_path: pathlib.Path) -> None:
+    file = tmp_path / "scene.json"
+
+    def written(scene: isowave.Scene) -> Any:
+        scene.save(file)
+        return json.loads(file.read_text()).get("annotations")
+
+    assert written(one(ball)) is None
+    assert isowave.open_scene(file, volume=ball).annotations is None
+    assert written(two(ball)) == {"caption": True, "title": "two"}
+    read = isowave.open_scene(file, volume=ball)
+    assert read.annotations == isowave.Annotations(("caption",), "", "two")
+    # "all" has a colour bar if there are colours that it explains.
+    bars = {"scale_bar": True, "axes": True, "caption": True}
+    assert written(one(ball).annotate()) == bars
+    assert written(one(ball).slice("z").annotate()) == bars | {"color_bar": True}
+    assert written(mapped(ball)) == bars | {"color_bar": True, "units": "µm"}
+    image = mapped(ball).render(size=(240, 180), device="host")
+    again = isowave.open_scene(file, volume=ball).render(size=(240, 180), device="host")
+    assert np.array_equal(again.annotated(), image.annotated())
+
+
+def test_titles_are_those_of_the_files(ball: isowave.Volume, tmp_path: pathlib.Path) -> None:
+    ball.save(tmp_path / "ball.zfp")
+    file = tmp_path / "scene.json"
+
+    def title(scene: isowave.Scene, **volume: Any) -> str:
+        scene.save(file, volume=tmp_path / "ball.zfp")
+        read = isowave.open_scene(file, **volume).annotations
+        assert read is not None
+        return read.title
+
+    assert title(one(ball).annotate("caption")) == "ball.zfp"
+    assert title(one(ball).annotate("caption", title="a ball")) == "a ball"
+    assert title(one(ball).annotate("caption"), volume=ball) == "", "it may be of another file"
 
 
 def test_tables_of_colours_are_kept(ball: isowave.Volume, tmp_path: pathlib.Path) -> None:
@@ -147,6 +186,15 @@ def test_what_is_wrong_is_one_line(ball: isowave.Volume, tmp_path: pathlib.Path)
         isowave.open_scene(file)
     with pytest.raises(TypeError, match="exact: the volume is open already"):
         isowave.open_scene(file, volume=ball, exact=True)
+    with pytest.raises(isowave.Error, match="annotations.units: 17 letters are too many"):
+        one(ball).annotate(units=17 * "µ").save(file)
+    with pytest.raises(isowave.Error, match="annotations.color_bar: there is no colour map"):
+        one(ball).annotate("color-bar").save(file)
+    file.write_text(
+        '{"isowave_scene": 1, "surfaces": [{"isovalue": 1}], "annotations": {"bar": 1}}'
+    )
+    with pytest.raises(isowave.Error, match='scene.json: annotations has no "bar"'):
+        isowave.open_scene(file, volume=ball)
     file.write_text('{"isowave_scene": 1, "surfaces": [{"isovalue": 1, "opacity": 7}]}')
     with pytest.raises(isowave.Error, match="scene.json: an opacity of 7") as caught:
         isowave.open_scene(file, volume=ball)

@@ -181,7 +181,7 @@ def test_the_focus_goes_through_everything_in_order_and_is_seen(page: Any) -> No
         return { name: e.name || e.className || e.localName, label: Boolean(named?.trim()),
           visible: style.outlineStyle !== "none" && parseFloat(style.outlineWidth) >= 2 };
     }"""
-    for _ in range(40):
+    for _ in range(50):
         page.keyboard.press("Tab")
         at = page.evaluate(focused)
         if at is None:
@@ -191,9 +191,10 @@ def test_the_focus_goes_through_everything_in_order_and_is_seen(page: Any) -> No
     if FIREFOX:  # whose keys scroll it from there
         seen.remove("panel")
     expected = "picture toggle isovalue slider reset shot copy paste save_scene open_scene"
-    expected += " color value opacity add light color_map background"
+    expected += " color value opacity add add_labels light color_map background gradient"
     expected += "".join(f" clip_{axis}_from clip_{axis}_to" for axis in "xyz")
-    expected += " caps max_error by samples ambient time_budget budget summary"
+    expected += " caps slice_x slice_y slice_z scale-bar axes caption units title"
+    expected += " max_error by samples ambient time_budget budget summary"
     assert seen == expected.split()
 
 
@@ -526,7 +527,8 @@ def test_nothing_that_is_done_in_the_page_is_malformed(page: Any) -> None:
     page.locator("[name=light]").select_option("stays")
     page.locator("[name=shadow]").select_option("soft")
     page.locator("[name=color_map]").select_option("gray")
-    for name in ("light_angle", "color_low", "color_high"):
+    page.get_by_role("button", name="Add y").click()
+    for name in ("light_angle", "color_low", "color_high", "offset", "slice_low", "slice_high"):
         for value in ("1e300", "-1e300", "1e18", "1e-300"):
             type_into(page.locator(f"[name={name}]"), value)
             page.keyboard.press("Enter")

@@ -62,7 +62,9 @@ def test_a_thumb_is_dragged_beside_the_other(open_page: Callable[..., Any]) -> N
         page = open_page()
         page.goto(server.url)
         rests(page)
-        box = page.get_by_label("z to", exact=True).bounding_box()
+        slider = page.get_by_label("z to", exact=True)
+        slider.scroll_into_view_if_needed()
+        box = slider.bounding_box()
         left, right, y = box["x"] + 6, box["x"] + box["width"] - 6, box["y"] + box["height"] / 2
         for begin, end in ((right, (left + right) / 2), (left, left + (right - left) / 4)):
             page.mouse.move(begin, y)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -24,6 +26,24 @@ def test_an_extent_shrinks_by_its_pixels_first() -> None:
     assert extent.within(5_000, 200_000) == Extent((50, 25), 2, 9)
     assert extent.within(20_000, 100_000) == Extent((100, 50), 2, 4)
     assert extent.within(20_000, 5_000) == Extent((50, 25), 2, 0)
+
+
+def test_rays_that_are_chosen_become_fewer_before_pixels_and_light() -> None:
+    extent = Extent((100, 50), 4, ambient=9, chooses=True)
+    assert extent.within(80_000, 800_000) == extent
+    assert extent.within(79_999, 800_000) == replace(extent, samples=3)
+    assert extent.within(80_000, 799_999) == replace(extent, samples=3)
+    assert extent.within(5_000, 50_000) == replace(extent, samples=1)
+    assert extent.within(4_000, 8_000) == Extent((89, 44), 1, 1, chooses=True)
+
+
+def test_light_that_bounces_takes_two_rays_for_each() -> None:
+    extent = Extent((100, 50), 2, ambient=2, shadow=3, bounce=8)
+    assert (extent.rays_of_hits, extent.ability) == (2 * 8 + 3, 2)
+    assert extent.within(20_000, 20_000 * 20) == extent
+    assert extent.within(20_000, 20_000 * 13) == replace(extent, bounce=4)
+    assert extent.within(20_000, 20_000 * 5) == Extent((100, 50), 2, 0, 3, 0)
+    assert [Extent((1, 1), 1, *rays).ability for rays in ((0, 0), (5, 0), (0, 1))] == [0, 1, 1]
 
 
 @pytest.mark.parametrize("rays", [1, 2, 7, 100, 12345])

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from viewer_fakes import PLAIN_WISH, FakeVolume
 
-from isowave import Camera, ClipPlane, ColorMap, Surface
+from isowave import Annotations, Camera, ClipPlane, ColorMap, Series, Slice, Surface
 from isowave._request import Request
 from isowave.viewer.protocol import (
     VERSION,
@@ -31,6 +31,7 @@ from isowave.viewer.session import Session
 
 CAMERA = {"eye": [0, 0, 5], "at": [0, 0, 0], "up": [0, 1, 0], "fovy_deg": 60}
 SURFACE = {"isovalue": 80, "color": [1, 0.5, 0], "opacity": 0.5}
+OPAQUE = {**SURFACE, "opacity": 1}
 PLANE = {"normal": [1, 0, 0], "offset": 5}
 WISH = PLAIN_WISH | {
     "id": 7,
@@ -46,8 +47,12 @@ WISH = PLAIN_WISH | {
     "caps": False,
 }
 COLOR_MAP = {"colors": "magma", "by": "axis", "axis": [0, 0, 1], "range": [-1, 5.5]}
+LABELS = {"labels": [3, 65535], "color": [1, 0.5, 0], "opacity": 0.5}
+SLICE = {"normal": [0, 0.5, -1], "offset": 9, "opacity": 0.5, "clipped": False}
+SLICE_MAP = {"colors": "magma", "range": [5.5, -1]}
 SHADOW = {"rays": 16, "angle": 6}
 LIT = {"light": [0, 1, 0], "shadow": SHADOW}
+ANNOTATIONS = {"what": ["axes", "caption"], "units": "mm", "title": "größer"}
 WEIGHTS = {"ambient": 0.1, "diffuse": 0, "specular": 0.2, "above": 3}
 
 
@@ -65,6 +70,11 @@ def test_messages_are_read() -> None:
     timed = check({**WISH, "max_error": None, "time_budget": 50})
     assert isinstance(timed, Wish) and timed.request.time_budget == 0.05  # ms to seconds
     assert timed.request.by == "proof"  # there is no error to judge
+    seen = check({**WISH, "by": "picture", "max_error": 0.01})
+    assert isinstance(seen, Wish) and seen.request.max_image_error == 0.01
+    assert (seen.request.max_error, seen.request.by, seen.request.samples) == (None, "proof", 2)
+    free = check({**WISH, "by": "picture", "max_error": None, "time_budget": 50})
+    assert isinstance(free, Wish) and free.request.max_image_error is None
     layered = check({**WISH, **PLAIN, "surfaces": [SURFACE, {**SURFACE, "isovalue": 120}]})
     assert isinstance(layered, Wish) and layered.request.color is None
     surface = Surface(80, (1, 0.5, 0), 0.5)
@@ -80,12 +90,32 @@ def test_messages_are_read() -> None:
     lit = check({**WISH, **LIT})
     assert isinstance(lit, Wish)
     assert (lit.request.shadow_rays, lit.request.light_angle) == (16, 6)
-    for by in ("field", "caps"):
+    bounced = check({**WISH, **LIT, "bounce": 9})
+    assert isinstance(bounced, Wish) and bounced.request.bounce_rays == 9
+    annotated = check({**WISH, "annotations": ANNOTATIONS})
+    assert isinstance(annotated, Wish)
+    assert annotated.annotations == Annotations(("axes", "caption"), "mm", "größer")
+    graded = check({**WISH, "background_top": [0, 0.5, 1]})
+    assert isinstance(graded, Wish) and graded.request.background_top == (0, 0.5, 1)
+    for by in ("field", "caps", "labels"):
         shown = check({**WISH, "color_map": {**COLOR_MAP, "by": by}})
         assert isinstance(shown, Wish) and shown.request.color == (1, 0.5, 0), "without a value"
         expected = Request(80, color_map=ColorMap("magma", (0, 0, 1), (-1, 5.5), by))
         assert shown.request.color_map == expected.color_map
     assert check({"type": "scene", "text": "{}"}) == SceneFile("{}")
+    sliced = check({**WISH, **PLAIN, "slices": [SLICE], "slice_map": SLICE_MAP, "step": 3})
+    assert isinstance(sliced, Wish) and sliced.step == 3
+    expected = Request(80, slice_map=ColorMap("magma", range=(5.5, -1)))
+    assert sliced.request.slice_map == expected.slice_map and sliced.request.color == (1, 0.5, 0)
+    labelled = check({**WISH, **PLAIN, "surfaces": [LABELS]})
+    assert isinstance(labelled, Wish) and labelled.request.has_labels
+    expected = Request(80, surfaces=[Surface(None, (1, 0.5, 0), 0.5, labels=[3, 65535])])
+    assert labelled.request.surfaces == expected.surfaces and labelled.request.isovalues == []
+    by_label = {**COLOR_MAP, "colors": "labels", "by": "labels", "range": None}
+    colored = check({**WISH, **PLAIN, "surfaces": [LABELS], "color_map": by_label})
+    assert isinstance(colored, Wish)
+    assert colored.request.color_map == Request(80, color_map=ColorMap(by="labels")).color_map
+    assert sliced.request.slices == (Slice((0, 0.5, -1), 9, 0.5, False),)
 
 
 PLAIN: dict[str, Any] = {"max_error": None, "ambient": 0}
@@ -117,8 +147,8 @@ BAD_WISHES: list[tuple[dict[str, Any], str]] = [
     ({"caps": 1}, "caps must be true or false"),
     ({"color_map": "magma"}, "color_map must have colors, by, axis and range"),
     ({"color_map": {**COLOR_MAP, "more": 1}}, "color_map must have colors, by, axis and range"),
-    ({"color_map": {**COLOR_MAP, "by": "time"}}, "by of color_map must be axis, field or caps"),
-    ({"color_map": {**COLOR_MAP, "by": ["axis"]}}, "by of color_map must be axis, field or caps"),
+    ({"color_map": {**COLOR_MAP, "by": "time"}}, "by of color_map must be one of axis, field"),
+    ({"color_map": {**COLOR_MAP, "by": ["axis"]}}, "by of color_map must be one of axis, field"),
     (
         {"color_map": {**COLOR_MAP, "by": "field"}, "max_error": None, "time_budget": 9},
         "colours by the field are drawn without time_budget",
@@ -142,6 +172,11 @@ BAD_WISHES: list[tuple[dict[str, Any], str]] = [
     ({**LIT, "shadow": {**SHADOW, "rays": 256}}, "rays must be an integer from 1 to 255"),
     ({**LIT, "shadow": {**SHADOW, "angle": 0}}, "angle must be a number from 0.01 to 45"),
     ({**LIT, "shadow": {**SHADOW, "angle": 46}}, "angle must be a number from 0.01 to 45"),
+    ({"bounce": 16}, "bounce needs a light"),
+    ({**LIT, "bounce": 256}, "bounce must be an integer from 0 to 255"),
+    ({**LIT, "bounce": None}, "bounce must be an integer"),
+    ({**PLAIN, **LIT, "bounce": 1, "slices": [SLICE]}, "bounce is for one opaque surface"),
+    ({**PLAIN, **LIT, "bounce": 1, "surfaces": 2 * [OPAQUE]}, "bounce is for one opaque surface"),
     ({"surfaces": SURFACE}, "surfaces must be a list of at most 8 surfaces"),
     ({**PLAIN, "surfaces": 9 * [SURFACE]}, "surfaces must be a list of at most 8 surfaces"),
     ({**PLAIN, "surfaces": [80]}, "a surface must have isovalue, color and opacity"),
@@ -154,12 +189,69 @@ BAD_WISHES: list[tuple[dict[str, Any], str]] = [
     ({**PLAIN, "surfaces": [SURFACE], "time_budget": 9}, "are drawn without time_budget"),
     ({**PLAIN, "surfaces": [SURFACE], "ambient": 8}, "ambient needs a surface of opacity 1"),
     ({**PLAIN, "surfaces": [SURFACE], **LIT}, "shadow needs a surface of opacity 1"),
+    ({**PLAIN, "surfaces": [{**LABELS, "labels": []}]}, "labels must be a list of integers"),
+    ({**PLAIN, "surfaces": [{**LABELS, "labels": 3}]}, "labels must be a list of integers"),
+    ({**PLAIN, "surfaces": [{**LABELS, "labels": [-1]}]}, "a label must be an integer from 0 to"),
+    ({**PLAIN, "surfaces": [{**LABELS, "labels": [65536]}]}, "a label must be an integer from 0"),
+    ({**PLAIN, "surfaces": [{**LABELS, "labels": [1.5]}]}, "a label must be an integer from 0 to"),
+    ({**PLAIN, "surfaces": [{**LABELS, "isovalue": 5}]}, "a surface must have labels, color and"),
+    ({**PLAIN, "surfaces": [LABELS, SURFACE]}, "labels are drawn without isosurfaces"),
+    ({**PLAIN, "surfaces": [LABELS], "slices": [SLICE]}, "labels are drawn without slices"),
+    (
+        {**PLAIN, "surfaces": [LABELS], "color_map": {**COLOR_MAP, "by": "caps"}},
+        "labels are drawn without colours by the field",
+    ),
+    ({**PLAIN, "surfaces": [LABELS], "max_error": 1}, "surfaces are drawn without max_error"),
+    ({"slices": SLICE}, "slices must be a list"),
+    ({**PLAIN, "slices": 8 * [SLICE]}, "surfaces and slices must be at most 8 together"),
+    (
+        {**PLAIN, "slices": 7 * [SLICE], "surfaces": 2 * [SURFACE]},
+        "surfaces and slices must be at most 8 together",
+    ),
+    ({"slices": [SLICE]}, "slices are drawn without max_error"),
+    ({**PLAIN, "slices": [SLICE], "time_budget": 9}, "slices are drawn without time_budget"),
+    ({**PLAIN, "slices": ["z"]}, "a slice must have normal, offset, opacity and clipped"),
+    ({**PLAIN, "slices": [{**SLICE, "more": 1}]}, "a slice must have normal, offset, opacity"),
+    ({**PLAIN, "slices": [{**SLICE, "normal": [0, 0, 0]}]}, "normal must be a direction"),
+    ({**PLAIN, "slices": [{**SLICE, "normal": "z"}]}, "normal must be three numbers"),
+    ({**PLAIN, "slices": [{**SLICE, "offset": 1e19}]}, "offset must be a number"),
+    ({**PLAIN, "slices": [{**SLICE, "offset": float("nan")}]}, "offset must be a number"),
+    ({**PLAIN, "slices": [{**SLICE, "opacity": 0}]}, "opacity must be a number from 0.001"),
+    ({**PLAIN, "slices": [{**SLICE, "clipped": 1}]}, "clipped must be true or false"),
+    ({"slice_map": None}, "slice_map must have colors and range, and nothing else"),
+    ({"slice_map": {**SLICE_MAP, "by": "axis"}}, "slice_map must have colors and range"),
+    ({"slice_map": {**SLICE_MAP, "colors": "jet"}}, "colors must be one of viridis, magma"),
+    ({"slice_map": {**SLICE_MAP, "colors": None}}, "colors must be one of viridis, magma"),
+    ({"slice_map": {**SLICE_MAP, "range": [1]}}, "range must be two numbers"),
+    ({"slice_map": {**SLICE_MAP, "range": [1, 1]}}, "range must have two numbers that differ"),
+    ({"step": -1}, "step must be an integer from 0"),
+    ({"step": 1.5}, "step must be an integer from 0"),
+    ({"step": None}, "step must be an integer from 0"),
+    ({"annotations": "all"}, "annotations must have what, units and title, and nothing else"),
+    ({"annotations": {**ANNOTATIONS, "more": 1}}, "annotations must have what, units and title"),
+    (
+        {"annotations": {**ANNOTATIONS, "what": []}},
+        "what must be a list of some of scale-bar, axes",
+    ),
+    ({"annotations": {**ANNOTATIONS, "what": ["all"]}}, "what must be a list of some of scale-bar"),
+    ({"annotations": {**ANNOTATIONS, "what": [[]]}}, "what must be a list of some of scale-bar"),
+    ({"annotations": {**ANNOTATIONS, "units": 1}}, "units must be a text of at most 16 letters"),
+    ({"annotations": {**ANNOTATIONS, "units": 17 * "m"}}, "units must be a text of at most 16"),
+    ({"annotations": {**ANNOTATIONS, "title": 81 * "a"}}, "title must be a text of at most 80"),
+    ({"annotations": {**ANNOTATIONS, "title": "\ud800"}}, "title must be a text of at most 80"),
     ({"color": [0, 0, 1.01]}, "color"),
     ({"background": [0, 0]}, "background"),
+    ({"background_top": [0, 0, 1.01]}, "background_top must be a number from 0 to 1"),
+    ({"background_top": "red"}, "background_top must be three numbers"),
     ({"max_error": 0}, "max_error"),
     ({"max_error": -1}, "max_error"),
-    ({"by": "luck"}, "by must be proof or sample"),
-    ({"by": ["proof"]}, "by must be proof or sample"),
+    ({"by": "luck"}, "by must be proof, sample or picture"),
+    ({"by": ["proof"]}, "by must be proof, sample or picture"),
+    ({"by": "picture", "max_error": 0}, "max_error must be a number from 1e-06 to 1"),
+    ({"by": "picture", "max_error": 1.5}, "max_error must be a number from 1e-06 to 1"),
+    ({"by": "picture", "max_error": 1, "time_budget": 100}, "not both"),
+    ({**PLAIN, "by": "picture", "surfaces": [SURFACE], "max_error": 1}, "without max_error"),
+    ({"by": "picture", "slices": [SLICE]}, "slices are drawn without max_error"),
     ({"max_error": None, "time_budget": 0.5}, "time_budget"),
     ({"max_error": 1, "time_budget": 100}, "not both"),
     ({"camera": []}, "camera"),
@@ -224,8 +316,14 @@ VALID: list[dict[str, Any]] = [
     {"type": "ack", "frame": 0},
     {"type": "budget", "bytes": 1 << 30},
     {**WISH, "camera": None},
+    {**WISH, "by": "picture", "max_error": 0.01},
     {**WISH, **PLAIN, "surfaces": [SURFACE]},
     {**WISH, **LIT, "color_map": {**COLOR_MAP, "by": "caps"}},
+    {**WISH, **PLAIN, "slices": [SLICE, SLICE], "slice_map": SLICE_MAP},
+    {**WISH, "step": 2},
+    {**WISH, "size": [200, 150], "annotations": ANNOTATIONS},
+    {**WISH, **PLAIN, "surfaces": [LABELS, {**LABELS, "labels": [7]}]},
+    {**WISH, **PLAIN, "surfaces": [LABELS], "color_map": {**COLOR_MAP, "by": "labels"}},
 ]
 ODD: list[Any] = [
     None, True, False, 0, 1, -1, 2**31, 2**53, 2**64, 10**300, 10**400, 0.0, -0.0, 1e-320, 1e308,
@@ -272,7 +370,7 @@ def test_fuzz() -> None:
     volume = FakeVolume(passes=1)
     ticks = itertools.count()
     scene = Scene(
-        volume,
+        Series(["a", "b", "c"], lambda step: volume),  # type: ignore[arg-type,return-value]
         isovalue=80,
         size=(16, 16),
         clock=lambda: next(ticks) * 0.1,

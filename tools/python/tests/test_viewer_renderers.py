@@ -1,4 +1,4 @@
-"""Renderers of a scene: budgets, memory, and limits, step by step."""
+"""Renderers of a scene: budgets, memory, and limits, step by step; and its thread."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from isowave._request import Request
 from isowave.viewer.protocol import Ack, Budget
 from isowave.viewer.renderers import GIVE_BACK_SECONDS, MAX_CAMERA_RAYS, make_host
 from isowave.viewer.scene import CERTAIN_SECONDS, REST_SECONDS, Scene
+from isowave.viewer.turns import Client
 
 
 def test_a_new_budget_makes_a_new_renderer_for_all() -> None:
@@ -258,11 +259,36 @@ def test_shadows_are_drawn_as_ambient_rays_are() -> None:
     assert not volume.renderers[-1]["rays"], "they are given back"
 
 
+def test_light_that_bounces_needs_a_renderer_of_its_own() -> None:
+    clock, volume = Clock(), FakeVolume()
+    scene = make_scene(volume, clock, size=(64, 48), max_rays=64 * 48 * 21)
+    eye = Eye(scene)
+    eye.wish(size=(64, 48), ambient=4)
+    run(scene)
+    eye.ack()
+    eye.wish(81.0, size=(64, 48), bounce_rays=16, light=(0, 1, 0))
+    run(scene)
+    made = [(r["rays"], r["bounce"]) for r in volume.renderers]
+    assert made == [(False, False), (True, False), (True, True)]
+    request = volume.frames[-1].request
+    assert (volume.frames[-1].size, request.bounce_rays, request.light) == ((64, 48), 10, (0, 1, 0))
+    last = eye.of_type("picture")[-1]
+    assert last["bounce"] == 10 and last["reduced"].endswith("0 ambient rays, 10 bounce rays.")
+    eye.ack()
+    eye.wish(82.0, size=(64, 48), ambient=4)
+    clock.now += GIVE_BACK_SECONDS
+    run(scene)
+    clock.now += GIVE_BACK_SECONDS
+    run(scene)
+    assert [r["bounce"] for r in volume.renderers] == [False, False, True, False]
+
+
 def test_renderers_are_made_with_the_field() -> None:
     clock, volume, field = Clock(), FakeVolume(), FakeVolume(value_range=(-5.0, math.inf))
     scene = make_scene(volume, clock, size=(64, 48), field=field, field_name="heat.zfp")
     eye = Eye(scene)
-    assert eye.of_type("welcome")[-1]["field"] == {"name": "heat.zfp", "range": [-5, None]}
+    told = {"name": "heat.zfp", "range": [-5, None], "labels": False}
+    assert eye.of_type("welcome")[-1]["field"] == told
     by_field: dict[str, Any] = {"color_map": ColorMap("magma", by="field")}
     eye.wish(size=(64, 48), **by_field)
     run(scene)
@@ -453,3 +479,31 @@ def test_clipped_surfaces_have_no_bounds() -> None:
     drawn = [frame.request for frame in volume.frames]
     assert [(tuple(r.clip), r.caps) for r in drawn[:2]] == 2 * [(planes, False)]  # first and whole
     assert all(r.clip == () for r in drawn[2:]) and "bounds" in drawn[-1].outputs
+
+
+def test_a_wish_that_comes_as_the_scene_goes_to_rest_is_drawn() -> None:
+    shown = threading.Event()
+
+    class Resting(Scene):
+        """Gets a wish once nothing is left to do, before it waits."""
+
+        client: Client | None = None
+
+        def step(self) -> bool:
+            did = super().step()
+            if not did and self.client is not None:
+                client, self.client = self.client, None
+                self.receive(client, wish_of(1))
+            return did
+
+    def post(head: dict[str, Any], data: bytes | None) -> None:
+        if head.get("stage") == "whole":
+            shown.set()
+
+    scene = Resting(FakeVolume(), isovalue=80, make_host=lambda v, f, d: None)
+    client = scene.join(post)
+    with scene._changed:
+        scene.client = client
+        scene._changed.notify_all()
+    assert shown.wait(60)
+    scene.close()

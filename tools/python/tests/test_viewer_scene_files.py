@@ -11,11 +11,15 @@ from typing import Any
 import numpy as np
 import pytest
 from browser_pages import (  # noqa: F401
+    asked,
     browser,
     fake_scene,
     keep,
+    open_file,
     open_page,
+    open_scene,
     rests,
+    saved_scene,
     screenshot,
     state,
     type_into,
@@ -44,6 +48,7 @@ SCENE = {
     "clip": [{"normal": [0, 0, -2], "offset": -24}],
     "caps": False,
     "background": "black",
+    "background_top": "red",
     "color_map": "magma",
     "color_axis": [0, 3, 0],
     "color_low": 2,
@@ -51,35 +56,7 @@ SCENE = {
     "above": 0.6,
     "light_direction": [0, 2, 0],
 }
-
-
-def asked(page: Any, volume: FakeVolume) -> Any:
-    """The request of the last picture."""
-    rests(page)
-    drawn = (frame.request for frame in reversed(volume.frames))
-    return next(request for request in drawn if request.outputs == ("rgb",))  # not of bounds
-
-
-def open_file(page: Any, name: str, text: str) -> None:
-    page.get_by_label("Scene file").set_input_files(
-        {"name": name, "mimeType": "application/json", "buffer": text.encode()}
-    )
-
-
-def open_scene(page: Any, text: str) -> None:
-    """Opens a file that is read, and waits for its wish."""
-    wish = page.evaluate("document.querySelector('main').dataset.wish")
-    open_file(page, "scene.json", text)
-    page.wait_for_function(
-        "(before) => document.querySelector('main').dataset.wish !== before", arg=wish
-    )
-
-
-def saved_scene(page: Any) -> str:
-    with page.expect_download() as saved:
-        page.get_by_role("button", name="Save scene").click()
-    assert saved.value.suggested_filename == "scene.json"
-    return Path(saved.value.path()).read_text()
+SLICED = {"slices": [{"normal": [1, 0, 0]}]}
 
 
 def test_files_are_opened_and_saved(open_page: Callable[..., Any]) -> None:  # noqa: F811
@@ -96,7 +73,7 @@ def test_files_are_opened_and_saved(open_page: Callable[..., Any]) -> None:  # n
         assert request.surfaces[0].opacity == 0.5
         assert request.clip == (ClipPlane((0, 0, -1), -12),) and not request.caps
         assert request.camera == isowave.Camera((40, 5, 60), (8, 8, 8))
-        assert request.background == (0, 0, 0)
+        assert request.background == (0, 0, 0) and request.background_top == (1, 0, 0)
         wanted = color_map_of(isowave.ColorMap("magma", (0, 1, 0), (2, 9)))
         assert request.color_map == wanted
         assert request.light == (0, 1, 0)
@@ -110,6 +87,7 @@ def test_files_are_opened_and_saved(open_page: Callable[..., Any]) -> None:  # n
         assert volume.frames[-1].request.clip == request.clip
         assert volume.frames[-1].request.lights == pytest.approx(request.lights)
         assert volume.frames[-1].request.light == request.light
+        assert volume.frames[-1].request.background_top == (1, 0, 0)
         text = saved_scene(page)
         fields = isowave._core.parse_scene(text)
         assert [each["isovalue"] for each in fields["surfaces"]] == [80, 120]
@@ -120,7 +98,7 @@ def test_files_are_opened_and_saved(open_page: Callable[..., Any]) -> None:  # n
         again = asked(page, volume)
         assert again.clip == request.clip and again.surfaces == request.surfaces
         assert again.camera == request.camera and again.color_map == wanted
-        assert again.light == request.light
+        assert again.light == request.light and again.background_top == (1, 0, 0)
         assert not page.problems
 
 
@@ -141,8 +119,13 @@ def test_bad_files_are_one_line_and_change_nothing(
             (json.dumps({**SCENE, "surfaces": [{"isovalue": 1, "opacity": 2}]}), "opacity of 2"),
             (json.dumps(parallel), "draws in perspective alone"),
             (json.dumps({**SCENE, "clip": 9 * SCENE["clip"]}), "up to 8"),  # type: ignore
-            (json.dumps({**SCENE, "background_top": "red"}), "no gradient as background"),
-            (json.dumps({**SCENE, "slices": [{"normal": [1, 0, 0]}]}), "shows no slices"),
+            (json.dumps({**SCENE, **SLICED, "slice_table": 256 * ["red"]}), "no tables of colours"),
+            (json.dumps({**SCENE, **SLICED, "slice_low": 0, "slice_high": 1e30}), "up to 1e18"),
+            (
+                json.dumps({**SCENE, "slices": [{"normal": [1, 0, 0], "offset": 1e30}]}),
+                "shows slices up to 1e18 from the origin",
+            ),
+            (json.dumps({**SCENE, "slices": 7 * [{"normal": [1, 0, 0]}]}), "give at most 8"),
             (
                 json.dumps({**SCENE, "surfaces": [{"isovalue": 1, "clipped": False}]}),
                 "cuts all surfaces",
@@ -184,6 +167,32 @@ def test_the_light_stays_where_it_is(open_page: Callable[..., Any]) -> None:  # 
         assert asked(page, volume).light == light and volume.frames[-1].request.camera != camera
         page.locator("[name=light]").select_option("turns")
         assert asked(page, volume).light is None and not page.problems
+
+
+def test_the_background_goes_to_another_colour(open_page: Callable[..., Any]) -> None:  # noqa: F811
+    volume = FakeVolume()
+    with Server(fake_scene(volume)) as server:
+        page = open_page()
+        page.goto(server.url)
+        assert asked(page, volume).background_top is None
+        top = page.get_by_label("Upper edge")
+        assert not top.is_visible()
+        page.get_by_label("Gradient").check()
+        request = asked(page, volume)
+        assert request.background == (1, 1, 1) and request.background_top is not None
+        top.fill("#ff0000")
+        assert asked(page, volume).background_top == (1, 0, 0) and state(page)["top"] == "ff0000"
+        keep(page, "gradient")
+        page.reload()
+        assert asked(page, volume).background_top == (1, 0, 0) and top.input_value() == "#ff0000"
+        page.evaluate("location.hash = 'iso=90&top=red'")
+        assert asked(page, volume).background_top == (1, 0, 0), "no colour changes nothing"
+        page.get_by_label("Gradient").uncheck()
+        assert asked(page, volume).background_top is None and not top.is_visible()
+        assert "top" not in state(page)
+        page.get_by_label("Gradient").check()
+        assert asked(page, volume).background_top == (1, 0, 0), "the last colour is kept"
+        assert not page.problems
 
 
 def test_colours_follow_an_axis(open_page: Callable[..., Any]) -> None:  # noqa: F811
@@ -299,6 +308,33 @@ def test_shadows_need_a_light_that_stays(open_page: Callable[..., Any]) -> None:
         assert not page.problems
 
 
+def test_light_bounces_if_it_stays_and_the_surface_is_alone(
+    open_page: Callable[..., Any],  # noqa: F811
+) -> None:
+    volume = FakeVolume()
+    with Server(fake_scene(volume)) as server:
+        page = open_page()
+        page.goto(server.url)
+        rests(page)
+        bounce = page.locator("[name=bounce]")
+        assert bounce.is_disabled() and not bounce.is_checked()
+        page.locator("[name=light]").select_option("stays")
+        assert asked(page, volume).bounce_rays == 0
+        bounce.check()
+        request = asked(page, volume)
+        assert request.bounce_rays == 16 and request.light is not None
+        assert state(page)["bounce"] == "16"
+        page.reload()
+        assert asked(page, volume).bounce_rays == 16 and bounce.is_checked()
+        text = saved_scene(page)
+        assert isowave._core.parse_scene(text)["bounce_rays"] == 16
+        open_scene(page, text.replace('"bounce_rays": 16', '"bounce_rays": 40'))
+        assert asked(page, volume).bounce_rays == 40 and state(page)["bounce"] == "40"
+        page.locator("[name=add]").click()
+        assert asked(page, volume).bounce_rays == 0 and bounce.is_disabled()
+        assert not page.problems
+
+
 def test_colours_are_by_the_field(open_page: Callable[..., Any]) -> None:  # noqa: F811
     volume = FakeVolume()
     with Server(fake_scene(volume, field=FakeVolume(), field_name="heat.zfp")) as server:
@@ -351,11 +387,13 @@ def test_the_picture_is_that_of_the_scene(open_page: Callable[..., Any]) -> None
     volume = isowave.open(FUEL, exact=True)
     scene = volume.scene().surface(20, "orange", opacity=0.4).surface(120)
     scene = scene.clip(ClipPlane((0, 1, 0), 14)).look(color_map="viridis", background="white")
+    scene = scene.look(background_top="blue")
     text = json.dumps(isowave._scene.scene_fields(scene))
     with Server(Scene(volume, scene=text, device="host", size=(800, 600))) as server:
         page = open_page(viewport={"width": 700, "height": 500})
         page.goto(server.url)
         rests(page)
+        keep(page, "scene_gradient")
         shown = np.asarray(Image.open(io.BytesIO(screenshot(page)[1])))
         expected = scene.render(size=(shown.shape[1], shown.shape[0]), device="host").rgb
         assert np.array_equal(shown, expected)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from browser_pages import (  # noqa: F401
     browser,
+    button,
     changes,
     drag,
     fake_scene,
@@ -33,10 +34,6 @@ from isowave.viewer.scene import Scene
 from isowave.viewer.server import Server
 
 BOTH = [Surface(80, "#dbbd87", 0.5), Surface(120, "#56b4e9")]
-
-
-def button(page: Any, name: str) -> Any:
-    return page.get_by_role("button", name=name, exact=True)
 
 
 def field(page: Any, name: str, number: int) -> Any:

@@ -137,6 +137,18 @@ def test_widgets_of_a_volume_share_a_renderer() -> None:
     assert not widget_module._scenes
 
 
+def test_a_widget_has_the_steps_of_a_series() -> None:
+    series = isowave.Series(["a.zfp", "b.zfp"], lambda step: FakeVolume())  # type: ignore
+    front = FrontEnd(series)  # type: ignore[arg-type]
+    front.say("a", HELLO)
+    front.wait("a", type="welcome", steps=["a.zfp", "b.zfp"])
+    front.say("a", {**PLAIN_WISH, "step": 1})
+    front.wait("a", type="picture", stage="lossless", step=1)
+    front.say("a", {**PLAIN_WISH, "id": 2, "step": 2})
+    front.wait("a", type="closed", message="step must be an integer from 0 to 1")
+    front.widget.close()
+
+
 def test_the_widget_carries_the_module() -> None:
     module = script()
     assert str(Widget._esm) == module and module.count("export default") == 1

@@ -21,6 +21,8 @@ from isowave._surface import Surface
 
 SIDE = 64  # voxels along each axis, spacing 1
 VALUES = 255.0  # at the centre; 0 at the middle of a face
+TILE_RAYS = 256 * 256  # of a tile of the picture, which shows its error
+FLIP_OF_ONE = 0.016  # of one ray a pixel
 
 #: A wish that asks for nothing special; tests change what they are about.
 PLAIN_WISH: dict[str, Any] = {
@@ -31,6 +33,7 @@ PLAIN_WISH: dict[str, Any] = {
     "camera": None,
     "color": [1, 1, 1],
     "background": [0, 0, 0],
+    "background_top": None,
     "samples": 1,
     "max_error": None,
     "by": "proof",
@@ -40,9 +43,14 @@ PLAIN_WISH: dict[str, Any] = {
     "caps": True,
     "surfaces": [],
     "color_map": None,
+    "slices": [],
+    "slice_map": {"colors": "gray", "range": None},
+    "step": 0,
+    "annotations": None,
     "lights": None,
     "light": None,
     "shadow": None,
+    "bounce": 0,
 }
 
 
@@ -145,7 +153,7 @@ class FakeRenderer:
         surfaces: Sequence[Surface] = (),
     ) -> Camera:
         if isovalue is None:
-            isovalue = min(surface.isovalue for surface in surfaces)
+            isovalue = min(surface.values[0] for surface in surfaces)
         centre = (SIDE - 1) / 2
         away = 2.2 * max(2.0, self._radius(isovalue)) * max(1.0, size[1] / size[0])
         return Camera((centre, centre, centre + away), (centre, centre, centre))
@@ -162,14 +170,32 @@ class FakeRenderer:
                 raise RuntimeError("the renderer was not made for so many rays")
             if (request.ambient or request.shadow_rays) and not self._options["rays"]:
                 raise RuntimeError("the renderer was not made for rays of hits")
-            if len(request.surfaces) > self._options.get("surfaces", 0):
-                raise RuntimeError("the renderer was made for fewer surfaces")
+            if request.bounce_rays and not self._options["bounce"]:
+                raise RuntimeError("the renderer was not made for light that bounces")
+            if request.num_surfaces > self._options.get("surfaces", 0):
+                raise RuntimeError("the renderer was made for fewer surfaces, or without slices")
+            if request.has_labels != self._options.get("labels", False):
+                raise RuntimeError("a renderer of labels draws labels alone, and others draw none")
+        if request.has_labels and request.slices:
+            raise RuntimeError("labels are drawn without slices")
         if len(set(request.isovalues)) < len(request.isovalues):
             raise RuntimeError(f"two surfaces have the isovalue {request.isovalue:g}")
         if request.needs_field and self._options.get("field") is None:
             raise RuntimeError("the renderer was made without a field")
-        if "bounds" in request.outputs and request.surfaces:
+        if "bounds" in request.outputs and (request.surfaces or request.slices):
             raise RuntimeError("errors are bounded of one opaque surface")
+        image_error = request.max_image_error
+        if (request.surfaces or request.slices) and (
+            request.max_error or image_error or request.time_budget
+        ):
+            raise RuntimeError("surfaces are drawn without max_error and time_budget")
+        if image_error and (request.max_error or request.time_budget or request.voxel_pixels):
+            raise RuntimeError("max_image_error chooses the detail, and is kept alone")
+        if request.voxel_pixels and not self._options["levels"]:
+            raise RuntimeError("the renderer was not made for levels of detail")
+        if image_error and not self._volume.on_host:
+            if width * height * self._options["samples"] ** 2 < TILE_RAYS:
+                raise RuntimeError("the renderer was made for fewer rays than a tile has")
         if math.isnan(request.isovalue):
             raise RuntimeError("the isovalue is not a number")
         self._volume.frames.append(drawn)
@@ -185,6 +211,7 @@ class FakeRenderer:
                 "decoded_blocks": 0 if cached else 100 * (i + 1),
                 "errors_are_stated": False,
                 "field_range": (3.0, 250.5) if request.needs_field else None,
+                "detail": self._chosen(request),
             }
             percent = 100.0 * (i + 1) / self._volume.passes
             if request.on_pass and not request.on_pass(FakeProgress(image, i + 1, percent)):
@@ -197,14 +224,33 @@ class FakeRenderer:
         bounds = np.choose(part.astype(int), [0, 0.2, 0.2, np.inf]).astype(np.float32)
         return FakeImage(image, statistics, True, depth, bounds)
 
+    def _chosen(self, request: Request) -> dict[str, Any] | None:
+        """Rays and levels for an error of the picture: FLIP is FLIP_OF_ONE by n x n rays, by n."""
+        error = request.max_image_error
+        if error is None:
+            return None
+        choices = [n for n in (1, 2, 4, 8) if n < request.samples] + [request.samples]
+        reached = [n for n in choices if 1.25 * FLIP_OF_ONE / n <= error]
+        samples = reached[0] if reached else choices[-1]
+        return {
+            "voxel_pixels": 0.5 if reached and self._options["levels"] else 0.0,
+            "voxel_error": 0.0,
+            "reachable": bool(reached),
+            "advice": "" if reached else "allow more rays",
+            "samples": samples,
+            "tiles": 48,
+            "flip": FLIP_OF_ONE / samples,
+            "highest_flip": 1.25 * FLIP_OF_ONE / samples,
+        }
+
     def _layers(self, request: Request) -> NDArray[np.uint8]:
         """The picture of one ball, or of balls one in another."""
         if not request.surfaces:
             return self._picture(request)
         seen: NDArray[Any] = np.array(_bytes(request.background))
-        for each in sorted(request.surfaces, key=lambda s: -s.isovalue):
+        for each in sorted(request.surfaces, key=lambda s: -s.values[0]):
             look: dict[str, Any] = {"color": each.color, "color_map": None}
-            ball = replace(request, surfaces=(), isovalue=each.isovalue, **look)
+            ball = replace(request, surfaces=(), isovalue=each.values[0], **look)
             seen = each.opacity * self._picture(ball) + (1 - each.opacity) * seen
         return np.round(seen).astype(np.uint8)
 

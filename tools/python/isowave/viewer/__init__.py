@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, cast
 from isowave._scene import Scene, scene_fields
 
 if TYPE_CHECKING:
-    from .interfaces import VolumeLike
+    from .interfaces import SeriesLike, VolumeLike
     from .server import Server
     from .widget import Widget
 
@@ -17,7 +17,7 @@ __all__ = ["view"]
 
 
 def view(
-    volume: VolumeLike | Scene,
+    volume: VolumeLike | SeriesLike | Scene,
     *,
     notebook: bool | None = None,
     block: bool | None = None,
@@ -25,19 +25,24 @@ def view(
 ) -> Widget | Server | None:
     """Shows a volume: in a notebook as a widget, elsewhere in a browser tab.
 
-    volume    the volume, or a scene of one, which pages show at first
+    volume    the volume, or a scene of one, which pages show at first; or a series, whose steps
+              pages go through and play. At most two steps are in memory. The range of values, the
+              histogram and the suggested isovalues are those of the first step
     notebook  whether to make a widget; None: if a Jupyter kernel runs and anywidget is installed
     block     in a browser: whether to wait until Ctrl-C, and then return None; None: unless Python
               is interactive
     options   isovalue     first isovalue; None, "auto": the first of Volume.suggested_isovalues()
-              field        a second volume, whose values may colour the surface; the volume
-                           itself, for its caps; None: that of the scene
+              field        a second volume, whose values or labels may colour the surface; the
+                           volume itself, for its caps; None: that of the scene. With a series:
+                           itself
               device, memory_budget [bytes], size (width, height) [pixels], samples: as for Renderer
+              annotations  isowave.Annotations that are drawn over pictures at first; None: those of
+                           the scene
               title        text above the picture
               max_clients  most clients at the same time
-              max_rays     most rays of a client's picture, pixels x samples^2 x (1 + ambient and
-                           shadow rays); larger pictures are drawn smaller, and say so; 150 million
-                           by default
+              max_rays     most rays of a client's picture, pixels x samples^2 x (1 + rays of
+                           light per hit); larger pictures are drawn smaller, and say so; 150
+                           million by default
               height       height of the widget [CSS pixels]
               host, port, open_browser: for the server; port 0: a free one
 

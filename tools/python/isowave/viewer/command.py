@@ -10,15 +10,18 @@ import socket
 import sys
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NoReturn
 
+from isowave._annotate import NAMES, Annotations
 from isowave._compress import open as open_volume
 from isowave._core import read_scene
-from isowave._scene_file import open_field
+from isowave._scene_file import annotations_of_scene, open_field
+from isowave._series import Series, open_series
 
 from . import missing
-from .protocol import MAX_RAYS, NO_LABELS, first_line, has_labels
+from .protocol import MAX_RAYS, first_line
 
 
 def parse_bytes(text: str) -> int:
@@ -47,6 +50,15 @@ def parse_levels(text: str) -> int:
     return 0 if text == "all" else int(text)
 
 
+def parse_annotations(text: str) -> tuple[str, ...]:
+    """Names of annotations, separated by commas; "none": (). Raises ValueError."""
+    asked = () if text == "none" else tuple(text.split(","))
+    for name in asked:
+        if name not in (*NAMES, "all"):
+            raise ValueError(f"'{name}' is none of {', '.join(NAMES)}, nor all, nor none")
+    return asked
+
+
 def reversed_axes(option: str, values: list[Any] | None) -> tuple[Any, ...] | None:
     """X Y Z, or one for all, as (z, y, x). Raises ValueError."""
     if values is None:
@@ -67,13 +79,16 @@ def make_parser() -> argparse.ArgumentParser:
     """The command line of `isowave view`."""
     parser = _Parser(
         prog="isowave view",
-        description="Shows isosurfaces of a volume in a browser, until Ctrl-C ends it.",
+        description="Shows isosurfaces of a volume, or of a series of volumes, in a browser, until "
+        "Ctrl-C ends it.",
     )
     add = parser.add_argument
     add(
         "volume",
-        nargs="?",
-        help="file of any format that isowave reads, or generate:... [that of --scene]",
+        nargs="*",
+        help="file of any format that isowave reads, or generate:... [that of --scene]. Several "
+        "files, a quoted pattern (step_*.nrrd), or a NIfTI or NRRD file with a fourth axis are the "
+        "steps of a series",
     )
     add(
         "-i",
@@ -85,8 +100,21 @@ def make_parser() -> argparse.ArgumentParser:
     add(
         "--field",
         metavar="FILE",
-        help="second volume, whose values may colour the surface; volume: the same one, for its "
-        "caps [that of --scene]",
+        help="second volume, whose values or labels may colour the surface; volume: the same one, "
+        "for its caps [that of --scene]",
+    )
+    add(
+        "--annotate",
+        type=_argument(parse_annotations),
+        metavar="LIST",
+        help="drawn over pictures at first, separated by commas: scale-bar, axes, color-bar, "
+        "caption; or all, or none [those of --scene]",
+    )
+    add(
+        "--units",
+        metavar="TEXT",
+        help="units of the world for the scale bar and colours along an axis, such as mm [those of "
+        "--scene]",
     )
     add("--device", help="host, or a device: index, gpu, cpu, a part of its name [gpu, else host]")
     add("--memory-budget", type=_argument(parse_bytes), help="most memory to draw: 600MB, 1GiB")
@@ -107,7 +135,7 @@ def make_parser() -> argparse.ArgumentParser:
         "--max-rays",
         type=int,
         default=MAX_RAYS,
-        help="most rays of a client's picture: pixels x samples x (1 + ambient and shadow rays); "
+        help="most rays of a client's picture: pixels x samples x (1 + rays of light per hit); "
         "larger pictures are drawn smaller, which the page says [%(default)s]",
     )
     add("--no-browser", action="store_true", help="only print the URL")
@@ -117,19 +145,27 @@ def make_parser() -> argparse.ArgumentParser:
 def scene_of(arguments: argparse.Namespace) -> dict[str, Any]:
     """The fields of --scene; none without. Raises ValueError, isowave.Error."""
     if arguments.scene is None:
-        if arguments.volume is None:
+        if not arguments.volume:
             raise ValueError("give a volume, or a scene that names one")
         return {}
     if arguments.isovalue is not None:
         raise ValueError("--scene has isovalues of its own: leave out --isovalue")
     fields = read_scene(arguments.scene)
-    if has_labels(fields):
-        raise ValueError(NO_LABELS)
-    if arguments.volume is None and not fields["volume"]:
+    if not arguments.volume and not fields["volume"]:
         raise ValueError(f"{arguments.scene} names no volume: give one")
     if fields["color_by_field"] and not (fields["field"] or arguments.field):
         raise ValueError(f"{arguments.scene} names no field: give --field")
     return fields
+
+
+def annotations_of(arguments: argparse.Namespace, fields: dict[str, Any]) -> Annotations | None:
+    """What is drawn over pictures at first; None: what the scene has. Raises ValueError."""
+    asked, units = arguments.annotate, arguments.units
+    found = annotations_of_scene(fields.get("annotations"), "")
+    if units is not None and (asked == () or (asked is None and found is None)):
+        raise ValueError(f"--units {units}: nothing is annotated: give --annotate")
+    changes = {name: each for name, each in (("what", asked), ("units", units)) if each is not None}
+    return replace(found or Annotations(), **changes) if changes else None
 
 
 def field_of(arguments: argparse.Namespace, fields: dict[str, Any]) -> str:
@@ -137,6 +173,30 @@ def field_of(arguments: argparse.Namespace, fields: dict[str, Any]) -> str:
     if arguments.field is not None:
         return str(arguments.field)
     return str(fields["field"]) if fields.get("color_by_field") else ""
+
+
+def series_of(names: Sequence[str], given: dict[str, Any]) -> Series | None:
+    """The series of several files, of a pattern, or of a file with a fourth axis.
+
+    None: a volume. Raises isowave.Error. Steps are not opened.
+    """
+    name, is_there = names[0], Path(names[0]).exists()
+    is_pattern = not (is_there or name.startswith("generate:")) and re.search(r"[*?[]", name)
+    if len(names) == 1 and not is_pattern and (not is_there or name.endswith(".zfp")):
+        return None
+    with warnings.catch_warnings(record=True) as noted:
+        series = open_series(names if len(names) > 1 else name, **given)
+    if len(series) == 1 and not is_pattern:
+        return None  # opening the volume warns of the same
+    for warning in noted:
+        warnings.warn(warning.message)
+    return series
+
+
+def title_of(names: Sequence[str]) -> str:
+    """The file's name, or the first and the last one."""
+    first, last = Path(names[0]).name, Path(names[-1]).name
+    return first if len(names) == 1 else f"{first} to {last}"
 
 
 def _argument(parse: Any) -> Any:
@@ -175,16 +235,21 @@ def main(argv: Sequence[str] | None = None) -> int:
         }
         fields = scene_of(arguments)
         given = {key: value for key, value in given.items() if value is not None}
-        name, of_field = arguments.volume or fields["volume"], field_of(arguments, fields)
+        annotations = annotations_of(arguments, fields)
+        names, of_field = arguments.volume or [fields["volume"]], field_of(arguments, fields)
+        series = series_of(names, given)
+        if series is not None and of_field not in ("", "volume"):
+            raise ValueError("a series has no second volume to colour by: name one of its steps")
         # The field comes first: if it cannot be opened, the volume need not be compressed.
         field = None if of_field in ("", "volume") else open_field(of_field, given)
-        volume = open_volume(name, **given)
+        volume = open_volume(names[0], **given) if series is None else series
         server = serve(
             volume,
             field=volume if of_field == "volume" else field,
             field_name=Path(of_field).name,
-            title=Path(name).name,
+            title=title_of(names),
             scene=json.dumps(fields) if arguments.scene else "",
+            annotations=annotations,
             isovalue=arguments.isovalue,
             device=arguments.device,
             memory_budget=arguments.memory_budget,

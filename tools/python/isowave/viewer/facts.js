@@ -6,13 +6,11 @@
  * @returns {Record<string, string>} names and values
  */
 function factsOf(head, state) {
-  const share = state.by === "sample" ? "99 % of the hits" : "most pixels";
-  const { max_error: error } = wishedSurfaces(state);
-  const detail = error ? `${share} within ${toText(error)} px` : "at full detail";
   const certain = !head.complete ? "the time was over: not complete"
-    : head.detail?.reachable === false ? head.detail.advice || "that error is out of reach"
-      : `complete, ${detail}`;
-  const rays = head.samples > 1 ? `, ${head.samples ** 2} rays a pixel` : "";
+    : head.detail?.reachable === false ? outOfReach(head.detail, state)
+      : `complete, ${errorOf(head.detail, state)}`;
+  const count = head.samples ** 2;
+  const rays = count > 1 ? `, ${count} rays a pixel` : choosesRays(state) ? ", 1 ray a pixel" : "";
   return {
     Size: `${head.size[0]} × ${head.size[1]}${rays}`,
     Passes: toCount(head.passes),
@@ -22,6 +20,25 @@ function factsOf(head, state) {
     ...(head.field_range && { "Field at the hits": head.field_range.map(toText).join(" to ") }),
     Picture: certain,
   };
+}
+
+/** The error of a picture that keeps it, in words. detail: as in head; null: full detail. */
+function errorOf(detail, state) {
+  const { max_error: error, by } = wishedQuality(state);
+  if (by !== "picture") {
+    const share = by === "sample" ? "99 % of the hits" : "most pixels";
+    return error ? `${share} within ${toText(error)} px` : "at full detail";
+  }
+  if (!detail) return "at full detail";
+  const { flip, highest_flip: highest } = detail;
+  const most = highest > flip ? `, at most ${toShort(highest)} with 95 % confidence` : "";
+  return `FLIP ${toShort(flip)}${most}`;
+}
+
+/** Why a picture does not keep its error. */
+function outOfReach({ advice }, { by, max_error: error }) {
+  if (by === "picture") return `FLIP ${toText(error)} is out of reach: ${advice}`;
+  return advice || "that error is out of reach";
 }
 
 /** The elements for the share of the surface that is certain. */

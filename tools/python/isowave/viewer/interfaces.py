@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -127,4 +127,19 @@ class VolumeLike(Protocol):
         ...
 
     def renderer(self, **options: Any) -> RendererLike:
+        ...
+
+
+@runtime_checkable
+class SeriesLike(Protocol):
+    """The part of isowave.Series that the viewer needs: volumes on one grid."""
+
+    @property
+    def names(self) -> Sequence[str]:
+        ...
+
+    def __len__(self) -> int:
+        ...
+
+    def __getitem__(self, step: int) -> Any:
         ...

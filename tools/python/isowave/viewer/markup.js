@@ -11,6 +11,7 @@ const HTML = `
     <p class="note" role="alert" hidden></p>
     <button class="toggle" type="button" aria-controls="panel" aria-expanded="true">Panel</button>
   </section>
+${TIME_ROW}
   <section class="iso" aria-label="Isovalue">
     <label class="number">Isovalue
       <input name="isovalue" type="number" step="any" min="-3.4e38" max="3.4e38" required></label>
@@ -42,29 +43,16 @@ const HTML = `
     <h2>Surfaces</h2>
     <ol class="surfaces" aria-label="Surfaces"></ol>
     <div class="buttons"><button type="button" name="add">Add surface</button></div>
+    ${LABEL_ROWS}
     ${LOOK_ROWS}
-    <label>Background <input name="background" type="color"></label>
     <h2>Clip</h2>${CLIP_ROWS}
     <p class="planes" hidden><span></span> <button type="button" name="drop_planes">Remove</button>
     </p>
     <label title="Flat caps where the volume is cut; otherwise cuts show the surface from within">
       Caps <input name="caps" type="checkbox"></label>
-    <h2>Quality</h2>
-    <label>Largest error <span class="unit"><input name="max_error" type="number"
-      min="0.001" max="1000"
-      step="any" placeholder="none"> px</span></label>
-    <label title="Evidence that the largest error is kept">Error judged by
-      <select name="by"><option value="proof">proof</option>
-      <option value="sample">sample</option></select></label>
-    <label>Samples per pixel <select name="samples"><option value="1">1</option>
-      <option value="2">4</option><option value="3">9</option><option value="4">16</option></select>
-    </label>
-    <label title="Rays of each point that find out how much of the sky it sees">Ambient rays
-      <select name="ambient"><option value="0">none</option>${
-  AMBIENT.map((n) => `<option>${n}</option>`).join("")}</select></label>
-    <label>Time budget <span class="unit"><input name="time_budget" type="number"
-      min="1" max="10000" step="any"
-      placeholder="none"> ms</span></label>
+    <h2>Slices</h2>${SLICE_ROWS}
+    <h2>Annotations</h2>${ANNOTATION_ROWS}
+    <h2>Quality</h2>${QUALITY_ROWS}
     <h2>Device</h2>
     <form class="budget"><label>Memory budget <span class="unit"><input name="budget" type="number"
       min="1"
@@ -90,8 +78,8 @@ const CSS = `
   font: 13px/1.45 system-ui, "Segoe UI", Roboto, "Helvetica Neue", sans-serif; }
 * { box-sizing: border-box; }
 [hidden] { display: none !important; }
-.frame { display: grid; height: 100%; grid: minmax(0, 1fr) auto / minmax(0, 1fr) auto;
-  grid-template-areas: "stage panel" "iso panel"; }
+.frame { display: grid; height: 100%; grid: minmax(0, 1fr) auto auto / minmax(0, 1fr) auto;
+  grid-template-areas: "stage panel" "time panel" "iso panel"; }
 .stage { grid-area: stage; position: relative; min-height: 0; }
 .picture { position: absolute; inset: 0; width: 100%; height: 100%; touch-action: none;
   cursor: grab; }
@@ -102,6 +90,16 @@ const CSS = `
 .note { position: absolute; left: 12px; bottom: 12px; max-width: calc(100% - 24px); margin: 0;
   padding: 8px 12px; border: 1px solid var(--edge); border-radius: 6px; background: var(--card); }
 .toggle { position: absolute; top: 10px; right: 10px; }
+.time { grid-area: time; display: flex; gap: 16px; align-items: start; padding: 8px 16px 4px;
+  background: var(--card); border-top: 1px solid var(--line); }
+.time button { flex: none; width: 36px; padding: 0; }
+.time svg { display: block; margin: auto; }
+.time [aria-pressed=true] .off, .time [aria-pressed=false] .on { display: none; }
+.time > div { flex: 1; min-width: 0; }
+.time input { display: block; width: 100%; height: 20px; margin: 0; accent-color: var(--accent); }
+.steps { display: flex; justify-content: space-between; gap: 12px; color: var(--soft);
+  font-size: 11px; font-variant-numeric: tabular-nums; }
+.steps output { min-width: 0; overflow-wrap: anywhere; text-align: center; }
 .iso { grid-area: iso; display: flex; gap: 16px; align-items: start; padding: 10px 16px 8px;
   background: var(--card); border-top: 1px solid var(--line); }
 .iso .number { display: block; width: 104px; flex: none; }
@@ -129,6 +127,7 @@ const CSS = `
 .panel label { display: flex; justify-content: space-between; align-items: center; gap: 8px;
   min-height: 30px; }
 .panel select { flex: none; width: 108px; }
+.panel label > input[type=text] { flex: none; width: 108px; }
 .panel input[type=color] { flex: none; width: 76px; margin-right: 32px; }
 .surfaces { list-style: none; margin: 0 0 6px; padding: 0; }
 .surfaces li { display: flex; align-items: center; gap: 4px; min-height: 32px; padding: 0 4px;
@@ -136,12 +135,26 @@ const CSS = `
 .surfaces li[aria-current] { border-color: var(--accent); background: var(--back); }
 .surfaces input { min-width: 0; }
 .panel .surfaces input[type=color] { width: 30px; margin: 0; }
-.panel .surfaces input[type=number] { flex: 0 0 68px; width: 68px; padding: 0 5px; }
+.panel .surfaces input:is([type=number], [type=text]) { flex: 0 0 68px; width: 68px;
+  padding: 0 5px; }
 .surfaces input[type=range] { flex: 1; accent-color: var(--accent); }
 .surfaces button { flex: none; width: 28px; padding: 0; }
+.groups ~ .buttons { margin-bottom: 8px; }
+.hint { margin: 0 0 4px; color: var(--soft); font-size: 12px; }
+[inert] { opacity: .45; }
 .surfaces svg { display: block; margin: auto; }
 .surfaces [aria-pressed=true] .off { display: none; }
 :disabled { opacity: .45; cursor: default; }
+.slices { list-style: none; margin: 0 0 6px; padding: 0; }
+.slices li { display: grid; grid-template-columns: 1ch minmax(0, 1fr) 76px 28px; gap: 0 6px;
+  align-items: center; padding: 4px 0; }
+.slices input { min-width: 0; width: 100%; margin: 0; }
+.slices input[type=range] { accent-color: var(--accent); }
+.slices button { padding: 0; }
+.slices div { grid-column: 2 / -1; display: flex; align-items: center; gap: 6px; min-height: 30px;
+  color: var(--soft); font-size: 12px; }
+.panel .slices label { flex: none; min-height: 0; gap: 4px; }
+.panel .slices input[type=checkbox] { width: auto; margin: 0; }
 .clip { display: flex; align-items: center; gap: 8px; min-height: 30px; }
 .clip span { width: 1ch; }
 .planes { display: flex; justify-content: space-between; align-items: center; margin: 0;
@@ -155,11 +168,13 @@ const CSS = `
 .clip input::-moz-range-thumb { width: ${THUMB}px; height: ${THUMB}px; border: 0;
   border-radius: 50%; background: var(--accent); cursor: ew-resize; pointer-events: auto; }
 .buttons { display: grid; grid-template-columns: 1fr 1fr; gap: 6px; }
+.thirds { grid-template-columns: 1fr 1fr 1fr; margin-bottom: 4px; }
 .paste { margin-top: 8px; }
 .paste label { display: block; }
 .problem { margin: 4px 0; color: var(--bad); }
 button, input, select, textarea { font: inherit; color: inherit; }
-button, input[type=number], select, textarea { border: 1px solid var(--edge); border-radius: 4px;
+button, input[type=number], input[type=text], select, textarea {
+  border: 1px solid var(--edge); border-radius: 4px;
   background: var(--field); padding: 0 8px; height: 28px; }
 button { cursor: pointer; background: var(--card); white-space: nowrap; }
 button:hover { border-color: var(--accent); color: var(--accent); }
@@ -184,9 +199,10 @@ summary { cursor: pointer; }
   margin: 0; }
 .closed .panel { display: none; }
 @container (max-width: 640px) {
-  .frame { overflow: auto; grid: minmax(220px, 1fr) auto auto / minmax(0, 1fr);
-    grid-template-areas: "stage" "iso" "panel"; }
-  .frame:not(.closed) { grid-template-rows: max(220px, 55cqh) auto auto; }
+  .frame { overflow: auto; grid: minmax(220px, 1fr) auto auto auto / minmax(0, 1fr);
+    grid-template-areas: "stage" "time" "iso" "panel"; }
+  .frame:not(.closed) { grid-template-rows: max(220px, 55cqh) auto auto auto; }
+  .time { gap: 10px; padding: 6px 10px; }
   .iso { gap: 10px; padding: 8px 10px; }
   .iso .number { width: 84px; }
   .panel { width: auto; border: 0; border-top: 1px solid var(--line); overflow: visible; }

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from isowave._annotate import NAMES, Annotations
+from isowave._checked import refuse
 from isowave._core import Error, parse_scene
 
 from .interfaces import ImageLike, VolumeLike
 from .pictures import Extent
-from .protocol import NO_LABELS, VERSION, first_line, has_labels
-from .renderers import Renderers
+from .protocol import MAX_TITLE, MAX_UNITS, VERSION, checked_text, first_line
+from .renderers import Renderers, may_have_labels
 from .turns import Frame, Stage
 
 
@@ -24,9 +27,14 @@ def welcome(
     value_range: tuple[float, float],
     isovalue: float | None,
     scene: dict[str, Any] | None,
+    annotations: dict[str, Any] | None,
     field: dict[str, Any] | None,
+    steps: list[str] | None,
 ) -> dict[str, Any]:
-    """Facts about the volume. isovalue: the first one. scene: fields of the first one."""
+    """Facts about the volume. isovalue, annotations: the first ones.
+
+    scene: fields of the first one. steps: names of a series' steps, whose first one is the volume.
+    """
     return {
         "type": "welcome",
         "version": VERSION,
@@ -40,21 +48,35 @@ def welcome(
         "max_error": finite(volume.max_error),
         "isovalue": isovalue,
         "scene": scene,
+        "annotations": annotations,
         "field": field,
+        "steps": steps,
+    }
+
+
+def first_annotations(wanted: Annotations | None) -> dict[str, Any] | None:
+    """As wishes have them. Raises TypeError; ValueError: texts that no wish may have."""
+    if wanted is None:
+        return None
+    if not isinstance(wanted, Annotations):
+        raise refuse("annotations", wanted, "isowave.Annotations")
+    return {
+        "what": [name for name in NAMES if name in wanted.what or "all" in wanted.what],
+        "units": checked_text(wanted.units, MAX_UNITS, "units"),
+        "title": checked_text(wanted.title, MAX_TITLE, "title"),
     }
 
 
 def field(volume: VolumeLike, name: str) -> dict[str, Any]:
     """Facts about the second volume. name: of its file; "volume": it is the drawn one."""
-    return {"name": name, "range": [finite(value) for value in volume.value_range]}
+    values = [finite(value) for value in volume.value_range]
+    return {"name": name, "range": values, "labels": may_have_labels(volume)}
 
 
 def scene(text: str) -> dict[str, Any]:
     """The fields of a scene file, or what is wrong with it."""
     try:
         fields = parse_scene(text)
-        if has_labels(fields):
-            raise Error(NO_LABELS)
     except Error as raised:
         return error(raised, None)
     return {"type": "scene", "fields": fields}
@@ -95,12 +117,14 @@ def picture(frame: Frame, stage: str, seconds: float) -> dict[str, Any]:
     return {
         "type": "picture",
         "wish": frame.wish.id,
+        "step": frame.wish.step,
         "stage": stage,
         "format": "jpeg",
         "size": list(frame.extent.size),
         "samples": frame.extent.samples,
         "ambient": frame.extent.ambient,
         "shadow": frame.extent.shadow,
+        "bounce": frame.extent.bounce,
         "field_range": None,
         "reduced": None,
         "notice": "",
@@ -125,23 +149,32 @@ def finished_picture(
 ) -> dict[str, Any]:
     statistics = image.statistics
     notices = map(volume.isovalue_notice, frame.wish.request.isovalues)
+    detail = plain(statistics.get("detail"))
+    keeps_error = detail is None or bool(detail["reachable"])
+    chosen = detail and detail.get("samples")
     return {
         **picture(frame, frame.stage.value, seconds),
-        "reduced": reduced(frame, renderers),
+        "samples": int(chosen or frame.extent.samples),
+        "reduced": reduced(frame, renderers, keeps_error),
         "notice": " ".join(filter(None, notices)),
         "complete": bool(image.complete),
         "passes": int(statistics["passes"]),
         "rays_cut": int(statistics.get("rays_cut", 0)),
         "percent": 100.0,
         "decoded_blocks": int(statistics["decoded_blocks"]),
-        "detail": plain(statistics.get("detail")),
+        "detail": detail,
         "field_range": pair(statistics.get("field_range")),
     }
 
 
-def reduced(frame: Frame, renderers: Renderers) -> str | None:
-    """Why a whole picture has fewer rays than its wish, in one line; None: it has all."""
+def reduced(frame: Frame, renderers: Renderers, keeps_error: bool) -> str | None:
+    """Why a whole picture has fewer rays than its wish, in one line; None: it has all.
+
+    A picture whose error is kept needs no more rays of its pixels.
+    """
     asked, extent = Extent.of(frame.wish.request), frame.extent
+    if asked.chooses and keeps_error:
+        asked = replace(asked, samples=extent.samples, chooses=extent.chooses)
     if frame.stage is not Stage.WHOLE or extent == asked:
         return None
     why = "The device has no memory for more"
@@ -151,7 +184,11 @@ def reduced(frame: Frame, renderers: Renderers) -> str | None:
     width, height = extent.size
     rays, ambient = count(extent.samples**2, "ray"), count(extent.ambient, "ambient ray")
     shadow = f", {count(extent.shadow, 'shadow ray')}" if asked.shadow else ""
-    return f"{why}: this picture has {width} x {height} pixels, {rays} a pixel, {ambient}{shadow}."
+    bounce = f", {count(extent.bounce, 'bounce ray')}" if asked.bounce else ""
+    return (
+        f"{why}: this picture has {width} x {height} pixels, {rays} a pixel, "
+        f"{ambient}{shadow}{bounce}."
+    )
 
 
 def count(number: int, thing: str) -> str:

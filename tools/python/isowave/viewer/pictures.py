@@ -5,14 +5,19 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image as pillow
 
+from isowave._annotate import Annotations, annotated
+from isowave._camera import Camera
 from isowave._request import Request
+
+
+LEAST_ANNOTATED: Final = (200, 150)  # pixels of a picture, as the library has it
 
 
 def count_rays(size: tuple[int, int], samples: int) -> int:
@@ -25,20 +30,31 @@ class Extent:
     """How much is drawn for a picture.
 
     size     width, height [pixels]
-    samples  rays per pixel along each axis
+    samples  rays per pixel along each axis; the most, if the renderer chooses them
     ambient, shadow  ambient rays and shadow rays per hit
+    bounce   least ambient rays that bring light, each by a ray more; 0: none does
+    chooses  whether the renderer chooses the rays per pixel, to keep an error of the picture
     """
 
     size: tuple[int, int]
     samples: int
     ambient: int = 0
     shadow: int = 0
+    bounce: int = 0
+    chooses: bool = False
 
     @staticmethod
     def of(request: Request) -> Extent:
         """The extent of a request with a size."""
         assert request.size is not None
-        return Extent(request.size, request.samples, request.ambient, request.shadow_rays)
+        return Extent(
+            request.size,
+            request.samples,
+            request.ambient,
+            request.shadow_rays,
+            request.bounce_rays,
+            request.max_image_error is not None,
+        )
 
     @property
     def rays(self) -> int:
@@ -52,23 +68,49 @@ class Extent:
 
     @property
     def rays_of_hits(self) -> int:
-        """Ambient rays and shadow rays, per hit."""
-        return self.ambient + self.shadow
+        """Those of light, per hit."""
+        return max(self.ambient, self.bounce) * (2 if self.bounce else 1) + self.shadow
+
+    @property
+    def ability(self) -> int:
+        """What a renderer must be made for: 0, no rays of hits; 1, some; 2, with bounced light."""
+        return 2 if self.bounce else min(self.rays_of_hits, 1)
 
     @property
     def of_camera(self) -> Extent:
         """The same without rays of hits."""
-        return Extent(self.size, self.samples)
+        return replace(self, ambient=0, shadow=0, bounce=0)
 
     def within(self, max_rays: int, max_all_rays: int) -> Extent:
         """A smaller extent. It has fewer pixels, then fewer ambient rays, then fewer shadow rays.
 
+        If rays per pixel are chosen, the most of them become fewer before all that.
+
         max_rays bounds the camera's rays, max_all_rays those of the hits, too.
         """
-        size = fit_size(self.size, self.samples, min(max_rays, max_all_rays))
-        left = max(0, max_all_rays // count_rays(size, self.samples) - 1)  # for each hit
+        samples = self.samples
+        if self.chooses:
+            most_rays = min(max_rays, max_all_rays // (1 + self.rays_of_hits))
+            samples = max(1, min(samples, math.isqrt(most_rays // count_rays(self.size, 1))))
+        size = fit_size(self.size, samples, min(max_rays, max_all_rays))
+        left = max(0, max_all_rays // count_rays(size, samples) - 1)  # for each hit
         shadow = min(self.shadow, left)
-        return Extent(size, self.samples, min(self.ambient, left - shadow), shadow)
+        most = (left - shadow) // (2 if self.bounce else 1)
+        ambient, bounce = min(self.ambient, most), min(self.bounce, most)
+        return Extent(size, samples, ambient, shadow, bounce, self.chooses)
+
+    def request(self, wish: Request, camera: Camera) -> Request:
+        """The request of a picture of this extent."""
+        return replace(
+            wish,
+            camera=camera,
+            size=self.size,
+            samples=self.samples,
+            ambient=self.ambient,
+            shadow_rays=self.shadow,
+            bounce_rays=self.bounce,
+            max_image_error=wish.max_image_error if self.chooses else None,
+        )
 
 
 def fit_size(size: tuple[int, int], samples: int, max_rays: int) -> tuple[int, int]:
@@ -93,6 +135,30 @@ def share_within(
     surface = np.isfinite(depth) | (bounds > 0)
     count = int(np.count_nonzero(surface))
     return float(np.count_nonzero(bounds[surface] <= limit)) / count if count else None
+
+
+def annotate(
+    picture: NDArray[np.uint8],
+    request: Request,
+    wanted: Annotations,
+    title: str,
+    ranges: tuple[Any, Any],
+) -> NDArray[np.uint8]:
+    """The picture with annotations. A picture that is too small for them stays as it is.
+
+    request  of the whole picture, with its camera and size. A smaller picture is made as large, so
+             that texts are legible and stay at their places
+    title    if `wanted` has none
+    ranges   as in isowave._annotate.annotated()
+    """
+    assert request.size is not None
+    if any(side < least for side, least in zip(request.size, LEAST_ANNOTATED)):
+        return picture
+    if picture.shape[1::-1] != request.size:
+        large = pillow.fromarray(picture).resize(request.size, pillow.Resampling.BILINEAR)
+        picture = np.asarray(large)
+    wanted = replace(wanted, title=wanted.title or title)
+    return annotated(picture, request.for_core(), ranges, wanted)
 
 
 class Stopped(Exception):

@@ -7,53 +7,70 @@ looks nowhere.
 
     {"type": "hello", "version": 1}
     {"type": "wish", "id": 7, "isovalue": 80, "size": [1280, 720], "camera": {...} | null,
-     "color": [r, g, b], "background": [r, g, b], "samples": 1, "max_error": 0.5 | null,
-     "by": "proof" | "sample", "time_budget": 100 | null, "ambient": 0,
+     "color": [r, g, b], "background": [r, g, b], "background_top": [r, g, b] | null,
+     "samples": 1, "max_error": 0.5 | null,
+     "by": "proof" | "sample" | "picture", "time_budget": 100 | null, "ambient": 0,
      "clip": [{"normal": [1, 0, 0], "offset": 20}], "caps": true,
-     "surfaces": [{"isovalue": 80, "color": [r, g, b], "opacity": 0.5}],
-     "color_map": {"colors": "viridis", "by": "axis" | "field" | "caps", "axis": [0, 0, 1],
-                   "range": [low, high] | null} | null,
+     "surfaces": [{"isovalue": 80, "color": [r, g, b], "opacity": 0.5}], or
+                 [{"labels": [3, 7], "color": [r, g, b], "opacity": 0.5}],
+     "color_map": {"colors": "viridis", "by": "axis" | "field" | "caps" | "labels",
+                   "axis": [0, 0, 1], "range": [low, high] | null} | null,
+     "slices": [{"normal": [0, 0, 1], "offset": 9, "opacity": 1, "clipped": true}],
+     "slice_map": {"colors": "gray", "range": [low, high] | null}, "step": 0,
+     "annotations": {"what": ["scale-bar", "axes", "color-bar", "caption"], "units": "mm",
+                     "title": "a head"} | null,
      "lights": {"ambient": 0.15, "diffuse": 0.5, "specular": 0.2, "above": 0.45} | null,
-     "light": [x, y, z] | null, "shadow": {"rays": 16, "angle": 3} | null}
+     "light": [x, y, z] | null, "shadow": {"rays": 16, "angle": 3} | null, "bounce": 0}
     {"type": "ack", "frame": 3}
     {"type": "budget", "bytes": 600000000 | null}
     {"type": "scene", "text": "a scene file's"}
 
+max_error is in pixels of the surface, by proof or by sample; or, by picture, FLIP of the picture,
+and then samples are the most rays of a pixel that may be chosen.
+
 Without surfaces, one opaque surface is drawn, of the wish's isovalue and color. Surfaces come in
-place of these, and without max_error and time_budget. Ambient rays and shadow need one of opacity
-1.
+place of these. Surfaces and slices come without max_error and time_budget; together they are 8 at
+most. Ambient rays and shadow need a surface of opacity 1. bounce needs a light, and neither
+surfaces nor slices. Surfaces are those of isovalues, or of labels without slices and colours by the
+field's values. step is that of a series; 0 for a volume. The annotations' title is the volume's
+name if it is empty.
 
 Answers are dicts with a "type": welcome, status, histogram, picture (with bytes), bounds, scene,
-error;
-view.js describes them.
+error; view.js describes them.
 """
 
 from __future__ import annotations
 
 import json
 import math
+import re
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
+from isowave._annotate import NAMES, Annotations
 from isowave._camera import Camera
 from isowave._clip import ClipPlane
-from isowave._color_map import ColorMap
+from isowave._color_map import BY, ColorMap
 from isowave._core import color_map_names
 from isowave._request import LIGHTS, Request
-from isowave._surface import MAX_SURFACES, Surface
+from isowave._slice import Slice
+from isowave._surface import MAX_LABEL, MAX_SURFACES, Surface
 
-VERSION: Final = 7
+VERSION: Final = 11
 MAX_MESSAGE_BYTES: Final = 8192
 MAX_SIDE: Final = 8192  # pixels of a picture along each axis
 MAX_SAMPLES: Final = 8  # rays of a pixel along each axis, as the library has it
-MAX_AMBIENT: Final = 255  # rays of a hit, as the library has it; of its shadow, too
+MAX_AMBIENT: Final = 255  # rays of a hit, as the library has it; shadow and bounce rays, too
 MIN_ANGLE: Final = 0.01  # of a light [degrees]
 MAX_ANGLE: Final = 45  # as the library has it
 MAX_PLANES: Final = 14  # as the library has it
+MIN_IMAGE_ERROR: Final = 1e-6  # FLIP
 MIN_OPACITY: Final = 1e-3  # of a surface
 MAX_LIGHT: Final = 10  # weight of a light
+MAX_UNITS: Final = 16  # letters of an annotation's units
+MAX_TITLE: Final = 80  # letters of an annotation's title
 MAX_TIME_BUDGET: Final = 10_000  # ms
 MAX_FLOAT32: Final = 3.4028234663852886e38
 MAX_LENGTH: Final = 1e18  # of a camera's coordinates [world units]
@@ -74,11 +91,15 @@ class Hello:
 class Wish:
     """What a front end wants to see. Only the newest wish of a client counts.
 
-    request  the whole picture, with a size; without a camera: the surface fills the picture
+    request      the whole picture, with a size; without a camera: the surface fills the picture
+    step         of the series, from 0
+    annotations  over the picture, or None; without a title, they have the volume's name
     """
 
     id: int  # grows with each wish of a client
     request: Request
+    step: int = 0
+    annotations: Annotations | None = None
 
     @property
     def size(self) -> tuple[int, int]:
@@ -162,15 +183,6 @@ def check(content: object) -> Message:
     return read(content)
 
 
-#: Why a scene of labels is refused.
-NO_LABELS: Final = "the viewer draws no labels: isowave render --scene does"
-
-
-def has_labels(fields: dict[str, Any]) -> bool:
-    """Whether a scene file has surfaces of labels. fields: as _core.parse_scene() gives them."""
-    return any("labels" in surface for surface in fields["surfaces"])
-
-
 def first_line(error: Exception) -> str:
     """Text of an error, in one line of bounded length."""
     lines = str(error).strip().splitlines()
@@ -208,6 +220,12 @@ def _triple(value: object, low: float, high: float, what: str) -> tuple[float, f
     return x, y, z
 
 
+def _optional_triple(
+    value: object, low: float, high: float, what: str
+) -> tuple[float, float, float] | None:
+    return None if value is None else _triple(value, low, high, what)
+
+
 def _camera(value: object) -> Camera | None:
     if value is None:
         return None
@@ -241,13 +259,21 @@ def _clip(value: object) -> tuple[ClipPlane, ...]:
 
 
 def _surface(value: object) -> Surface:
-    if not isinstance(value, dict) or value.keys() != {"isovalue", "color", "opacity"}:
-        raise ProtocolError("a surface must have isovalue, color and opacity, and nothing else")
-    return Surface(
-        _number(value["isovalue"], -MAX_FLOAT32, MAX_FLOAT32, "isovalue"),
-        _triple(value["color"], 0, 1, "color"),
-        _number(value["opacity"], MIN_OPACITY, 1, "opacity"),
-    )
+    own = "labels" if isinstance(value, dict) and "labels" in value else "isovalue"
+    if not isinstance(value, dict) or value.keys() != {own, "color", "opacity"}:
+        raise ProtocolError(f"a surface must have {own}, color and opacity, and nothing else")
+    color = _triple(value["color"], 0, 1, "color")
+    opacity = _number(value["opacity"], MIN_OPACITY, 1, "opacity")
+    if own == "labels":
+        return Surface(None, color, opacity, labels=_labels(value["labels"]))
+    isovalue = _number(value["isovalue"], -MAX_FLOAT32, MAX_FLOAT32, "isovalue")
+    return Surface(isovalue, color, opacity)
+
+
+def _labels(value: object) -> tuple[int, ...]:
+    if not isinstance(value, list) or not value:
+        raise ProtocolError("labels must be a list of integers")
+    return tuple(_integer(label, 0, MAX_LABEL, "a label") for label in value)
 
 
 def _surfaces(content: dict[str, Any]) -> tuple[Surface, ...]:
@@ -258,6 +284,10 @@ def _surfaces(content: dict[str, Any]) -> tuple[Surface, ...]:
         if value and content[name]:
             raise ProtocolError(f"surfaces are drawn without {name}")
     surfaces = tuple(_surface(surface) for surface in value)
+    if len({bool(surface.labels) for surface in surfaces}) == 2:
+        raise ProtocolError("surfaces of labels are drawn without isosurfaces")
+    if surfaces and surfaces[0].labels and content["slices"]:
+        raise ProtocolError("labels are drawn without slices")
     if surfaces and all(surface.opacity < 1 for surface in surfaces):
         for name in ("ambient", "shadow"):
             if content[name]:
@@ -265,27 +295,64 @@ def _surfaces(content: dict[str, Any]) -> tuple[Surface, ...]:
     return surfaces
 
 
+def _slice(value: object) -> Slice:
+    keys = {"normal", "offset", "opacity", "clipped"}
+    if not isinstance(value, dict) or value.keys() != keys:
+        raise ProtocolError(
+            "a slice must have normal, offset, opacity and clipped, and nothing else"
+        )
+    plane = _plane({name: value[name] for name in ("normal", "offset")})
+    opacity = _number(value["opacity"], MIN_OPACITY, 1, "opacity")
+    return Slice(plane.normal, plane.offset, opacity, _flag(value["clipped"], "clipped"))
+
+
+def _slices(content: dict[str, Any]) -> tuple[Slice, ...]:
+    value, count = content["slices"], max(1, len(content["surfaces"]))
+    if not isinstance(value, list):
+        raise ProtocolError("slices must be a list")
+    if value and count + len(value) > MAX_SURFACES:
+        raise ProtocolError(f"surfaces and slices must be at most {MAX_SURFACES} together")
+    for name in ("max_error", "time_budget"):
+        if value and content[name] is not None:
+            raise ProtocolError(f"slices are drawn without {name}")
+    return tuple(_slice(each) for each in value)
+
+
+def _slice_map(value: object) -> ColorMap:
+    if not isinstance(value, dict) or value.keys() != {"colors", "range"}:
+        raise ProtocolError("slice_map must have colors and range, and nothing else")
+    return ColorMap(_colors(value["colors"]), range=_range(value["range"]))
+
+
+def _colors(value: object) -> str:
+    if not isinstance(value, str) or value not in color_map_names():
+        raise ProtocolError(f"colors must be one of {', '.join(color_map_names())}")
+    return value
+
+
+def _range(value: object) -> tuple[float, float] | None:
+    if value is None:
+        return None
+    if not isinstance(value, list) or len(value) != 2:
+        raise ProtocolError("range must be two numbers")
+    low, high = (_number(limit, -MAX_LENGTH, MAX_LENGTH, "range") for limit in value)
+    if low == high:
+        raise ProtocolError("range must have two numbers that differ")
+    return low, high
+
+
 def _color_map(value: object) -> ColorMap | None:
     if value is None:
         return None
     if not isinstance(value, dict) or value.keys() != {"colors", "by", "axis", "range"}:
         raise ProtocolError("color_map must have colors, by, axis and range, and nothing else")
-    colors, by, limits = value["colors"], value["by"], value["range"]
-    if colors not in color_map_names():
-        raise ProtocolError(f"colors must be one of {', '.join(color_map_names())}")
-    if by not in ("axis", "field", "caps"):
-        raise ProtocolError("by of color_map must be axis, field or caps")
+    colors, by = _colors(value["colors"]), value["by"]
+    if by not in BY:
+        raise ProtocolError(f"by of color_map must be one of {', '.join(BY)}")
     axis = _triple(value["axis"], -1, 1, "axis")
     if math.hypot(*axis) < 1e-3:
         raise ProtocolError("axis must be a direction")
-    if limits is None:
-        return ColorMap(colors, axis, None, by)
-    if not isinstance(limits, list) or len(limits) != 2:
-        raise ProtocolError("range must be two numbers")
-    low, high = (_number(limit, -MAX_LENGTH, MAX_LENGTH, "range") for limit in limits)
-    if low == high:
-        raise ProtocolError("range must have two numbers that differ")
-    return ColorMap(colors, axis, (low, high), by)
+    return ColorMap(colors, axis, _range(value["range"]), by)
 
 
 def _lights(value: object) -> dict[str, float] | None:
@@ -320,6 +387,50 @@ def _shadow(content: dict[str, Any]) -> dict[str, Any]:
     }
 
 
+def _bounce(content: dict[str, Any]) -> int:
+    """Least number of rays that bring light."""
+    rays = _integer(content["bounce"], 0, MAX_AMBIENT, "bounce")
+    if rays and content["light"] is None:
+        raise ProtocolError("bounce needs a light")
+    if rays and (content["surfaces"] or content["slices"]):
+        raise ProtocolError("bounce is for one opaque surface without slices")
+    return rays
+
+
+def _error(content: dict[str, Any]) -> dict[str, Any]:
+    """Arguments of a Request."""
+    value, by = content["max_error"], content["by"]
+    if by not in ("proof", "sample", "picture"):
+        raise ProtocolError("by must be proof, sample or picture")
+    if value is None:
+        return {}
+    if content["time_budget"] is not None:
+        raise ProtocolError("a picture keeps max_error or time_budget, not both")
+    if by == "picture":
+        return {"max_image_error": _number(value, MIN_IMAGE_ERROR, 1, "max_error")}
+    return {"max_error": _number(value, 1e-3, 1e3, "max_error"), "by": by}
+
+
+def _annotations(value: object) -> Annotations | None:
+    if value is None:
+        return None
+    if not isinstance(value, dict) or value.keys() != {"what", "units", "title"}:
+        raise ProtocolError("annotations must have what, units and title, and nothing else")
+    what = value["what"]
+    if not isinstance(what, list) or not what or any(name not in NAMES for name in what):
+        raise ProtocolError(f"what must be a list of some of {', '.join(NAMES)}")
+    units = checked_text(value["units"], MAX_UNITS, "units")
+    return Annotations(tuple(what), units, checked_text(value["title"], MAX_TITLE, "title"))
+
+
+def checked_text(value: object, most: int, what: str) -> str:
+    """A text. most: of its letters. Raises ProtocolError."""
+    # Half of a surrogate pair is no letter.
+    if not isinstance(value, str) or len(value) > most or re.search("[\ud800-\udfff]", value):
+        raise ProtocolError(f"{what} must be a text of at most {most} letters")
+    return value
+
+
 def _flag(value: object, what: str) -> bool:
     if not isinstance(value, bool):
         raise ProtocolError(f"{what} must be true or false")
@@ -338,16 +449,15 @@ def _read_hello(content: dict[str, Any]) -> Hello:
 
 def _read_wish(content: dict[str, Any]) -> Wish:
     size = content["size"]
-    if content["max_error"] is not None and content["time_budget"] is not None:
-        raise ProtocolError("a picture keeps max_error or time_budget, not both")
     if not isinstance(size, list) or len(size) != 2:
         raise ProtocolError("size must be two integers")
-    if content["by"] not in ("proof", "sample"):
-        raise ProtocolError("by must be proof or sample")
     time_budget = _optional(content["time_budget"], 1, MAX_TIME_BUDGET, "time_budget")
     surfaces, color = _surfaces(content), _triple(content["color"], 0, 1, "color")
     color_map = _color_map(content["color_map"])
     by_field = color_map is not None and color_map.by != "axis"
+    is_value = by_field and color_map is not None and color_map.by != "labels"
+    if is_value and surfaces and surfaces[0].labels:
+        raise ProtocolError("labels are drawn without colours by the field")
     if by_field and time_budget is not None:
         raise ProtocolError("colours by the field are drawn without time_budget")
     request = Request(
@@ -360,17 +470,22 @@ def _read_wish(content: dict[str, Any]) -> Wish:
         lights=_lights(content["lights"]),
         light=_light(content["light"]),
         **_shadow(content),
+        bounce_rays=_bounce(content),
         background=_triple(content["background"], 0, 1, "background"),
+        background_top=_optional_triple(content["background_top"], 0, 1, "background_top"),
         clip=_clip(content["clip"]),
         caps=_flag(content["caps"], "caps"),
         surfaces=surfaces,
+        slices=_slices(content),
+        slice_map=_slice_map(content["slice_map"]),
         outputs=("rgb",),
-        max_error=_optional(content["max_error"], 1e-3, 1e3, "max_error"),
-        by=content["by"] if content["max_error"] is not None else "proof",
+        **_error(content),
         time_budget=None if time_budget is None else time_budget / 1000,
         ambient=_integer(content["ambient"], 0, MAX_AMBIENT, "ambient"),
     )
-    return Wish(_integer(content["id"], 0, MAX_ID, "id"), request)
+    step = _integer(content["step"], 0, MAX_ID, "step")
+    wish_id = _integer(content["id"], 0, MAX_ID, "id")
+    return Wish(wish_id, request, step, _annotations(content["annotations"]))
 
 
 def _read_ack(content: dict[str, Any]) -> Ack:
@@ -392,9 +507,9 @@ _READERS: Final[dict[str, tuple[dict[str, None], Callable[[dict[str, Any]], Mess
     "hello": (dict.fromkeys(("type", "version")), _read_hello),
     "wish": (
         dict.fromkeys(
-            "type id isovalue size camera color background samples max_error by"
-            " time_budget ambient clip caps surfaces color_map lights light"
-            " shadow".split()
+            "type id isovalue size camera color background background_top samples max_error by"
+            " time_budget ambient clip caps surfaces color_map slices slice_map"
+            " lights light shadow bounce step annotations".split()
         ),
         _read_wish,
     ),

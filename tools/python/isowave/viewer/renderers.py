@@ -2,26 +2,30 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from isowave import _core
+from isowave._color_map import color_map_of
 from isowave._levels import Voxels
 from isowave._renderer import host_renderer
-from isowave._surface import MAX_SURFACES
+from isowave._request import Request
+from isowave._surface import MAX_LABEL, MAX_SURFACES
 
 from .interfaces import RendererLike, VolumeLike
 from .pictures import Extent
 from .protocol import TokenBucket, Wish, first_line
+from .steps import Steps
 from .turns import Stage
 
 FIRST_DIVISOR: Final = 4  # of width and height, for the first picture
 HOST_SECONDS: Final = 0.5  # for a device to be ready, before the host draws meanwhile
 GIVE_BACK_SECONDS: Final = 5.0  # without need of a large renderer, until a smaller one is made
 MAX_CAMERA_RAYS: Final = 1 << 24  # of a picture: they take memory, and make passes long
-
+TILE: Final = (256, 256)  # rays of a tile that shows the error of a picture, as the library has it
 
 NO_SURFACES: Final = (
     "the device lacks the memory for these surfaces: draw fewer, or give a larger memory budget"
@@ -36,12 +40,20 @@ class RendererOptions:
 
     largest: Extent  # of a picture
     memory_budget: int | None
-    rays_of_hits: bool = False  # pictures may have ambient and shadow rays, which takes memory
+    rays_of_hits: int = 0  # Extent.ability of pictures; each more takes memory
     surfaces: int = 0  # most of a picture, unless it has one opaque one; each takes memory
+    step: int = 0  # of the series
+    labels: bool = False  # a device's draws surfaces of labels alone, or none
+    by_label: bool = False  # its field has labels, which colour surfaces
 
     @property
     def rays(self) -> int:
         return self.largest.rays
+
+    def is_like(self, other: RendererOptions) -> bool:
+        """Whether both draw the same step, labels, or not, and colours by them, or not."""
+        kinds = [(each.step, each.labels, each.by_label) for each in (self, other)]
+        return kinds[0] == kinds[1]
 
 
 class Renderers:
@@ -49,7 +61,9 @@ class Renderers:
 
     The renderer is the host's if isowave.Renderer chooses that, as on a machine without a GPU.
 
-    device, field  as in isowave.Renderer
+    steps     the volumes
+    field     as in isowave.Renderer; None with shows_volume: the volume that is drawn
+    device    as in isowave.Renderer
     first     what the first renderer is made for; none is made for less
     max_rays  of a client's picture, with those of its hits
     make_host draws until the device's renderer is made
@@ -62,9 +76,10 @@ class Renderers:
 
     def __init__(
         self,
-        volume: VolumeLike,
+        steps: Steps,
         *,
         field: VolumeLike | None,
+        shows_volume: bool,
         device: str | None,
         first: RendererOptions,
         max_rays: int,
@@ -75,7 +90,7 @@ class Renderers:
         do: Callable[[Callable[[], None]], None],
         clock: Callable[[], float],
     ) -> None:
-        self._volume, self._field = volume, field
+        self._steps, self._field, self._shows_volume = steps, field, shows_volume
         self._device, self._make_host = device, make_host
         self._changed, self._wishes, self._tell = changed, wishes, tell
         self._do, self._clock = do, clock
@@ -128,6 +143,12 @@ class Renderers:
         plan = extent if self._may_have_rays else extent.of_camera
         return plan.within(self._ray_limit, self.max_rays)
 
+    def _of_camera(self, plan: Extent) -> Extent:
+        """The camera's rays that a renderer is made for: those of a tile, if they are more."""
+        tile = Extent(TILE, 1).within(self._ray_limit, MAX_CAMERA_RAYS)
+        is_small = plan.chooses and plan.rays < tile.rays
+        return tile if is_small else Extent(plan.size, plan.samples)
+
     def fitted(self, wish: Wish, stage: Stage) -> Extent:
         """A stage's picture, within what the device's renderer was made for.
 
@@ -137,12 +158,50 @@ class Renderers:
         if stage is not Stage.WHOLE:
             width, height = (max(1, side // FIRST_DIVISOR) for side in wish.size)
             plan = Extent((width, height), 1)
+        if made is None and plan.chooses:  # full detail until the device draws
+            plan = replace(plan, samples=1, chooses=False)
         if made is None or self.on_host:
             return plan.within(self._ray_limit, self.max_rays)
         fitted = plan.within(made.rays, self.max_rays)
+        if made.rays_of_hits < 2:
+            fitted = replace(fitted, bounce=0)
         return fitted if made.rays_of_hits else fitted.of_camera
 
     # What renderer is wanted.
+
+    def suits(self, wish: Wish) -> bool:
+        """Whether the wish is of the renderer's kind. The host's renderer draws labels, too."""
+        draws_alike = self.on_host or self.wanted.labels == wish.request.has_labels
+        return draws_alike and wish.step == self._steps.drawn and self._has_field(wish.request)
+
+    def _has_field(self, request: Request) -> bool:
+        """Whether the renderer has the field that a request needs.
+
+        If no renderer could be made with a field of labels, requests without colours need another.
+        """
+        wanted, volume = self.wanted, self._steps.volume
+        if not request.needs_field:
+            return not (self.failed and wanted.by_label)
+        needed = self._field_of(volume, request.has_labels, is_by_label(request))
+        return needed is self._field_of(volume, wanted.labels, wanted.by_label)
+
+    def move(self, wish: Wish) -> None:
+        """Wants a renderer of the wish's step, which was read, and of its kind.
+
+        Raises what reading the step raised.
+        """
+        with self._changed:
+            if wish.step != self._steps.drawn:
+                self._steps.draw(wish.step)
+                self.host = None  # it draws another step
+            labels, surfaces = wish.request.has_labels, self.wanted.surfaces
+            if self.on_host:  # it draws both
+                labels = self.wanted.labels
+            self.renderer = None
+            if labels != self.wanted.labels:
+                surfaces = room_for(wish)
+            kind: dict[str, Any] = {"labels": labels, "by_label": is_by_label(wish.request)}
+            self._want(replace(self.wanted, step=wish.step, surfaces=surfaces, **kind))
 
     def grow(self, wish: Wish, stage: Stage) -> bool:
         """Wants a renderer for what the wish's picture has: more rays, those of hits, surfaces.
@@ -157,9 +216,10 @@ class Renderers:
             raise RuntimeError(NO_SURFACES)
         if surfaces == wanted.surfaces and stage is Stage.FIRST:
             return False
-        of_hits = wanted.rays_of_hits or plan.rays_of_hits > 0
-        largest = plan.of_camera if plan.rays > wanted.rays else wanted.largest
-        more = RendererOptions(largest, wanted.memory_budget, of_hits, surfaces)
+        of_hits = max(wanted.rays_of_hits, plan.ability)
+        camera = self._of_camera(plan)
+        largest = camera if camera.rays > wanted.rays else wanted.largest
+        more = replace(wanted, largest=largest, rays_of_hits=of_hits, surfaces=surfaces)
         if more == wanted:
             return False
         self._want(more)
@@ -175,16 +235,22 @@ class Renderers:
     def _needed(self) -> RendererOptions:
         """The smallest renderer for what clients want now. The lock is held."""
         plans = [self.plan(wish) for wish in self._wishes()]
-        largest = max((self._base, *plans), key=lambda plan: plan.rays)
-        of_hits = any(plan.rays_of_hits > 0 for plan in plans)
-        surfaces = max(map(room_for, self._wishes()), default=0)
-        budget = self.wanted.memory_budget
-        return RendererOptions(largest.of_camera, budget, of_hits, surfaces)
+        largest = max((self._base, *map(self._of_camera, plans)), key=lambda plan: plan.rays)
+        of_hits = max((plan.ability for plan in plans), default=0)
+        alike = [w for w in self._wishes() if w.request.has_labels == self.wanted.labels]
+        surfaces = max(map(room_for, alike), default=1 if self.wanted.labels else 0)
+        by_label = self.wanted.by_label and any(is_by_label(w.request) for w in self._wishes())
+        more: dict[str, Any] = {"rays_of_hits": of_hits, "surfaces": surfaces, "by_label": by_label}
+        return replace(self.wanted, largest=largest, **more)
 
     def note_needs(self) -> None:
         """Notes since when the renderer is much larger than clients need. The lock is held."""
         needed, wanted = self._needed(), self.wanted
-        has_more = wanted.rays_of_hits > needed.rays_of_hits or wanted.surfaces > needed.surfaces
+        has_more = (
+            wanted.rays_of_hits > needed.rays_of_hits
+            or wanted.surfaces > needed.surfaces
+            or wanted.by_label > needed.by_label
+        )
         fits = needed.rays > wanted.rays / 2 and not has_more
         if fits or self.on_host:
             self._too_large_since = None
@@ -219,31 +285,47 @@ class Renderers:
         Kernels may take long to compile: in another thread, and the host draws meanwhile.
         """
         with self._changed:
-            self.is_making, wanted = True, self.wanted
+            self.is_making, wanted, made = True, self.wanted, self._made
+            self._steps.leave_at = math.inf
+            volume = self._steps.volume
             self.renderer, self._made = None, None
-            self._tell(None)
-        self._do(lambda: self._make_renderer(wanted))
+            if made is None or replace(made, step=wanted.step) != wanted:
+                self._tell(None)  # of another step, pictures tell
+        self._do(lambda: self._make_renderer(volume, wanted))
         # Not by a renderer with quick=True: a wish with max_error or time_budget would wait for the
         # device. The host leaves both out, and the device then draws the wish with them. The host's
         # renderer is made in a thread of its own, and only if the device takes long.
         if self._make_host is not None:
-            self._do(self._make_for_host)
+            self._do(lambda: self._make_for_host(volume))
 
-    def _make_renderer(self, wanted: RendererOptions) -> None:
+    def _field_of(self, volume: VolumeLike, labels: bool, by_label: bool) -> VolumeLike | None:
+        """The field of a renderer of these options.
+
+        Labels that colour surfaces are those of the second volume if it may have some, else of the
+        volume itself.
+        """
+        second = volume if self._shows_volume else self._field
+        if by_label:
+            return second if second is not None and may_have_labels(second) else volume
+        return None if labels else second
+
+    def _make_renderer(self, volume: VolumeLike, wanted: RendererOptions) -> None:
         options: dict[str, Any] = {
             "device": self._device,
             "size": wanted.largest.size,
             "samples": wanted.largest.samples,
             "memory_budget": wanted.memory_budget,
-            "levels": self._volume.num_levels > 1,
-            "bounds": True,
-            "time_budget": True,
-            "rays": wanted.rays_of_hits,
+            "levels": volume.num_levels > 1 and not wanted.labels,
+            "bounds": not wanted.labels,
+            "time_budget": not wanted.labels,
+            "labels": wanted.labels,
+            "rays": wanted.rays_of_hits > 0,
+            "bounce": wanted.rays_of_hits > 1,
             "surfaces": wanted.surfaces,
-            "field": self._field,
+            "field": self._field_of(volume, wanted.labels, wanted.by_label),
         }
         try:
-            renderer = self._volume.renderer(**options)
+            renderer = volume.renderer(**options)
         except Exception as error:
             self._renderer_failed(wanted, error)
             return
@@ -252,6 +334,7 @@ class Renderers:
             if self._closing:
                 return
             self.renderer, self._made, self._fallback = renderer, wanted, wanted
+            self._steps.has_renderer(self._clock())
             self._tell(None)
             self._changed.notify_all()
 
@@ -259,7 +342,10 @@ class Renderers:
         """Goes back to what worked. If nothing did, waits for another budget."""
         with self._changed:
             self.is_making = False
+            self._steps.has_renderer(self._clock())
             fallback = self._fallback if self._fallback != wanted else None
+            if fallback is not None and not fallback.is_like(wanted):
+                fallback = None  # the step's volume may be gone, and labels are no surfaces
             if self.wanted == wanted:
                 self.failed, self.failure = fallback is None, first_line(error)
                 self.host = None
@@ -274,16 +360,18 @@ class Renderers:
             self._tell(error)
             self._changed.notify_all()
 
-    def _make_for_host(self) -> None:
+    def _make_for_host(self, volume: VolumeLike) -> None:
         def is_over() -> bool:
-            return self._closing or not self.is_making
+            is_other = self._steps.volume is not volume
+            return self._closing or not self.is_making or is_other
 
         with self._changed:
             if self.host is not None or self._changed.wait_for(is_over, HOST_SECONDS):
                 return
+        field = self._field_of(volume, False, self.wanted.by_label)
         try:
             assert self._make_host is not None
-            host = self._make_host(self._volume, self._field, self._device)
+            host = self._make_host(volume, field, self._device)
         except Exception:  # there is not enough memory: then nothing is drawn meanwhile
             return
         with self._changed:
@@ -294,8 +382,20 @@ class Renderers:
 
 def room_for(wish: Wish) -> int:
     """How many surfaces a renderer is made for: as one adds surfaces, it is made anew thrice."""
-    count = len(wish.request.surfaces)
+    count = wish.request.num_surfaces  # 1, if there are slices alone
     return 1 << (count - 1).bit_length() if count else 0
+
+
+def is_by_label(request: Request) -> bool:
+    """Whether labels colour the surfaces."""
+    color_map = color_map_of(request.color_map)
+    return color_map is not None and color_map.by == "labels"
+
+
+def may_have_labels(volume: VolumeLike) -> bool:
+    """Whether all voxels may be labels, as the library takes them."""
+    low, high = volume.value_range
+    return volume.source_dtype.kind in "iu" and low >= 0 and high <= MAX_LABEL
 
 
 def make_host(

@@ -2,6 +2,7 @@
 
     Turns (turns.py)          clients, and whose picture is next
     Renderers (renderers.py)  the renderer, made for what clients want
+    Steps (steps.py)          volumes of a series
     Scene                     the thread in which all is drawn
     Session (session.py)      a front end's connection
 
@@ -26,15 +27,17 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from isowave._annotate import Annotations
 from isowave._camera import Camera
 from isowave._checked import Isovalue
 
 from . import messages
-from .interfaces import ImageLike, ProgressLike, RendererLike, VolumeLike
+from .interfaces import ImageLike, ProgressLike, RendererLike, SeriesLike, VolumeLike
 from .jpeg import encode_jpeg
-from .pictures import Extent, Stopped, encode_png, share_within
-from .protocol import MAX_FLOAT32, MAX_RAYS, Ack, Budget, Message, SceneFile, Wish
+from .pictures import Extent, Stopped, annotate, encode_png, share_within
+from .protocol import MAX_FLOAT32, MAX_RAYS, Ack, Budget, Message, ProtocolError, SceneFile, Wish
 from .renderers import MakeHost, RendererOptions, Renderers, make_host
+from .steps import Steps
 from .turns import Client, Frame, Post, Stage, Turns
 
 PASS_SECONDS: Final = 0.06  # between pictures of passes
@@ -51,19 +54,22 @@ TOO_MANY_BUDGETS: Final = "the memory budget was changed too often: try again in
 class Scene:
     """A volume's renderer and those who look at it.
 
+    volume         a volume, or a series: each client looks at a step of its own. At most two steps
+                   are in memory. Range, histogram and suggested isovalues are those of the first.
     isovalue       at first; None, "auto": the first of Volume.suggested_isovalues()
     scene          what pages show at first: JSON of scene_fields(); "": the surface of `isovalue`
-    field          a second volume, for colours by its values; it may be the volume itself
+    annotations    what pages draw over pictures at first; None: those of `scene`
+    field          a second volume, for colours by its values or labels; it may be the volume
+                   itself, or the series itself, and else comes with no series
     field_name     of the field's file, for scenes that pages save
     device         as in isowave.Renderer
     memory_budget  as in isowave.Renderer
     size, samples  the largest picture that the renderer is made for at first; it is made anew when
                    a client wants more
     max_clients    further ones are refused
-    max_rays       of a client's picture: pixels x samples^2 x (1 + ambient and shadow rays). A
-                   larger one is drawn with fewer pixels, then fewer of these rays, and says so. At
-                   most MAX_CAMERA_RAYS come from the camera, or as many as `size` and `samples`
-                   have.
+    max_rays       of a client's picture: pixels x samples^2 x (1 + Extent.rays_of_hits). A larger
+                   one is drawn with fewer pixels, then fewer of these rays, and says so. At most
+                   MAX_CAMERA_RAYS come from the camera, or as many as `size` and `samples` have.
     make_host      makes a renderer that draws while the device's is prepared, or None
     clock          seconds; tests replace it
     start          False: no thread; call step() instead, as tests do
@@ -73,12 +79,13 @@ class Scene:
 
     def __init__(
         self,
-        volume: VolumeLike,
+        volume: VolumeLike | SeriesLike,
         *,
         isovalue: Isovalue | None = None,
         title: str = "",
         scene: str = "",
-        field: VolumeLike | None = None,
+        annotations: Annotations | None = None,
+        field: VolumeLike | SeriesLike | None = None,
         field_name: str = "",
         device: str | None = None,
         memory_budget: int | None = None,
@@ -97,19 +104,31 @@ class Scene:
         for name, limit in (("max_clients", max_clients), ("max_rays", max_rays)):
             if limit < 1:
                 raise ValueError(f"{name} {limit}: give 1 or more")
-        self._volume, self._isovalue, self._title = volume, isovalue, title
-        self._field = field
-        self._field_name = "volume" if field is volume else field_name
+        shows_volume = field is volume
+        if isinstance(volume, SeriesLike) and not (field is None or shows_volume):
+            raise ValueError("a series has no second volume: leave out field")
+        if isinstance(field, SeriesLike) and not shows_volume:
+            raise ValueError("the field is a series: give one of its volumes")
+        self._isovalue, self._title = isovalue, title
         self._first_scene = json.loads(scene) if scene else None
+        self._first_annotations = messages.first_annotations(annotations)
         self._max_clients, self._clock = max_clients, clock
         self._changed = threading.Condition()
+        self._has_threads, self._threads = start, list[threading.Thread]()
+        self._steps = Steps(volume, self._changed, self._do)
+        self._first = self._steps.volume  # of a series: until its facts are known
+        self._facts: dict[str, Any] = {}
+        self._field = None if shows_volume or isinstance(field, SeriesLike) else field
+        self._shows_volume = shows_volume
+        self._field_name = "volume" if shows_volume else field_name
         self._closing = self._prepared = False
         self._histogram: dict[str, Any] | None = None
         self._histogram_due = True
         self._range = (0.0, 1.0)
         self._renderers = Renderers(
-            volume,
-            field=field,
+            self._steps,
+            field=self._field,
+            shows_volume=shows_volume,
             device=device,
             first=RendererOptions(Extent(size, samples), memory_budget),
             max_rays=max_rays,
@@ -120,9 +139,7 @@ class Scene:
             do=self._do,
             clock=clock,
         )
-        self._turns = Turns(self._renderers.can_draw, clock)
-        self._threads: list[threading.Thread] = []
-        self._has_threads = start
+        self._turns = Turns(self._renderers.can_draw, self._renderers.suits, self._steps, clock)
         if start:
             self._do(self._work)
 
@@ -142,7 +159,7 @@ class Scene:
                 return None
             client = Client(deliver)
             self._turns.clients.append(client)
-            client.post(messages.status(self._volume, self._renderers), None)
+            client.post(messages.status(self._steps.volume, self._renderers), None)
             if self._prepared:
                 self._welcome(client)
             return client
@@ -164,6 +181,9 @@ class Scene:
             if isinstance(message, Ack):
                 client.acknowledge(message.frame, self._clock())
             elif isinstance(message, Wish):
+                if message.step >= len(self._steps):
+                    most = len(self._steps) - 1
+                    raise ProtocolError(f"step must be an integer from 0 to {most}")
                 client.take(message)
                 self._renderers.note_needs()
             elif isinstance(message, Budget) and not self._renderers.set_budget(message.bytes):
@@ -224,7 +244,7 @@ class Scene:
         """The renderer is another one, or is being made, or could not be. The lock is held."""
         if error is not None:
             self._broadcast(messages.error(error, None))
-        self._broadcast(messages.status(self._volume, self._renderers))
+        self._broadcast(messages.status(self._steps.volume, self._renderers))
 
     def _broadcast(self, head: dict[str, Any]) -> None:
         for client in list(self._turns.clients):
@@ -242,14 +262,24 @@ class Scene:
             self._renderers.make()
             return True
         with self._changed:
+            self._read_steps()
             turn = self._turns.next()
         if turn is not None:
             self._serve(*turn)
             return True
         if self._histogram_due:
             self._make_histogram()
+            self._forget_first()
             return True
         return False
+
+    def _read_steps(self) -> None:
+        """Has the step read that a client waits for; else the next one, if all look at one."""
+        step = self._turns.step_to_read()
+        if step is not None:
+            self._steps.read(step)
+        elif len({wish.step for wish in self._turns.wishes()}) == 1:
+            self._steps.read_ahead()
 
     def _work(self) -> None:
         self._renderers.make()  # meanwhile, the volume is looked at
@@ -257,6 +287,7 @@ class Scene:
             if self.step():
                 continue
             with self._changed:
+                self._read_steps()  # a wish may have come since
                 seconds = self._seconds_to_rest()
                 if not self._closing and seconds != 0:
                     self._changed.wait(seconds)
@@ -278,6 +309,8 @@ class Scene:
         try:
             if stage is Stage.LOSSLESS:
                 self._encode_lossless(client, wish)
+            elif not self._renderers.suits(wish):
+                self._move(wish)
             elif renderer is None:
                 raise RuntimeError(self._renderers.failure)
             elif stage is Stage.CERTAIN:
@@ -286,6 +319,13 @@ class Scene:
                 self._draw(renderer, client, wish, stage, extent)
         except Exception as error:  # of the library, or of its drivers
             self._wish_failed(client, wish, error)
+
+    def _move(self, wish: Wish) -> None:
+        """Wants another renderer, which is made next. Raises what reading the step raised."""
+        if wish.step != self._steps.drawn and self._histogram_due:
+            self._make_histogram()
+            self._forget_first()
+        self._renderers.move(wish)
 
     def _wish_failed(self, client: Client, wish: Wish, error: Exception) -> None:
         with self._changed:
@@ -302,15 +342,10 @@ class Scene:
             if client.wish is not wish:
                 return
             client.camera = camera
-        frame = Frame(client, wish, stage, camera, began, extent)
+        frame = Frame(client, wish, stage, camera, began, extent, client.ranges)
         frame.by_host = renderer is self._renderers.host
         request = replace(
-            wish.request,
-            camera=camera,
-            size=extent.size,
-            samples=extent.samples,
-            ambient=extent.ambient,
-            shadow_rays=extent.shadow,
+            extent.request(wish.request, camera),
             on_pass=lambda so_far: self._on_pass(frame, so_far),
         )
         if frame.by_host:  # full detail until the device draws, not interrupted by a time
@@ -319,14 +354,17 @@ class Scene:
         if frame.stopped:
             self._show_what_there_is(frame, image)
             return
-        rgb = picture_of(image)
+        ranges = image.statistics.get("color_range"), image.statistics.get("slice_range")
+        frame.ranges = ranges
+        rgb = self._annotated(frame, picture_of(image))
         data = encode_jpeg(rgb)
         seconds = self._clock() - frame.began
-        head = messages.finished_picture(frame, seconds, image, self._volume, self._renderers)
+        volume = self._steps.volume
+        head = messages.finished_picture(frame, seconds, image, volume, self._renderers)
         with self._changed:
             if self._is_stale(frame):
                 return
-            now = self._clock()
+            now, client.ranges = self._clock(), frame.ranges
             client.offer(head, data, now, keep=True)
             if stage is Stage.FIRST:
                 # Not while the next wish is on its way: it would wait for a pass to end.
@@ -336,6 +374,20 @@ class Scene:
             else:
                 client.stage, client.due = Stage.LOSSLESS, now + REST_SECONDS
                 client.lossless, client.whole_seconds = (head, rgb), now - frame.began
+                client.voxel_pixels = chosen_voxel_pixels(image, frame)
+
+    def _annotated(self, frame: Frame, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """The picture with its wish's annotations."""
+        wish, names = frame.wish, self._steps.names
+        if wish.annotations is None:
+            return picture
+        extent = frame.extent
+        if frame.stage is Stage.FIRST:
+            with self._changed:
+                extent = self._renderers.fitted(wish, Stage.WHOLE)
+        whole = replace(wish.request, camera=frame.camera, size=extent.size)
+        title = self._title if names is None else names[wish.step]
+        return annotate(picture, whole, wish.annotations, title, frame.ranges)
 
     def _on_pass(self, frame: Frame, so_far: ProgressLike) -> bool:
         """Sends the picture so far if it is worth it. False: the frame is to stop."""
@@ -361,7 +413,7 @@ class Scene:
                 and frame.client.takes_more
             )
         if worth_it:
-            data = encode_jpeg(so_far.rgb)
+            data = encode_jpeg(self._annotated(frame, so_far.rgb))
             frame.last_sent = self._clock()
             frame.sending_took = frame.last_sent - now
             with self._changed:
@@ -382,7 +434,7 @@ class Scene:
         client = frame.client
         if frame.stage is not Stage.FIRST or self._clock() - client.shown < SHOW_SECONDS:
             return
-        data = encode_jpeg(picture_of(image))
+        data = encode_jpeg(self._annotated(frame, picture_of(image)))
         with self._changed:
             if client.joined:
                 self._offer_pass(frame, data)
@@ -410,7 +462,8 @@ class Scene:
             if client.wish is wish:
                 now = self._clock()
                 # Errors are bounded only of one surface, opaque and whole.
-                is_bounded = not (wish.request.clip or wish.request.surfaces)
+                request = wish.request
+                is_bounded = not (request.clip or request.surfaces or request.slices)
                 client.stage = Stage.CERTAIN if is_bounded else Stage.DONE
                 client.due = now + CERTAIN_SECONDS
                 head = {**head, "stage": "lossless", "format": "png"}
@@ -426,15 +479,11 @@ class Scene:
         pixels = extent.size[1] / wish.size[1]  # of the first picture, to one of the whole picture
         max_error = wish.request.max_error
         request = replace(
-            wish.request,
-            camera=client.camera,
-            size=extent.size,
-            samples=extent.samples,
+            extent.request(wish.request, client.camera),
             outputs=("depth", "bounds"),
             max_error=None if max_error is None else max_error * pixels,
+            voxel_pixels=client.voxel_pixels * pixels,
             time_budget=None,
-            ambient=0,
-            shadow_rays=0,
             color_map=None,
             on_pass=lambda so_far: client.wish is wish and not self._closing,
         )
@@ -451,7 +500,7 @@ class Scene:
     # What is known of the volume before the first picture.
 
     def _prepare(self) -> None:
-        low, high = (float(v) for v in self._volume.value_range)
+        low, high = (float(v) for v in self._first.value_range)
         known = math.isfinite(low) and math.isfinite(high)
         if known:
             self._range = low, high
@@ -459,15 +508,33 @@ class Scene:
             self._make_histogram()
         if self._isovalue is None:
             self._isovalue = self._first_isovalue()
+        shown = self._first if self._shows_volume else self._field
+        field = None if shown is None else messages.field(shown, self._field_name)
+        self._facts = messages.welcome(
+            self._first,
+            self._title,
+            self._range,
+            self._isovalue,
+            self._first_scene,
+            self._first_annotations,
+            field,
+            self._steps.names,
+        )
         with self._changed:
             self._prepared = True
             for client in list(self._turns.clients):
                 self._welcome(client)
+        self._forget_first()
+
+    def _forget_first(self) -> None:
+        """Once its facts are known, the first step of a series may go from memory."""
+        if self._steps.names is not None and not self._histogram_due:
+            del self._first
 
     def _first_isovalue(self) -> float:
         """Any value of the range draws something for a person to start from."""
         try:
-            suggested = self._volume.suggested_isovalues()
+            suggested = self._first.suggested_isovalues()
         except Exception as error:
             with self._changed:
                 self._broadcast(messages.error(error, None))
@@ -475,11 +542,7 @@ class Scene:
         return suggested[0] if suggested else (self._range[0] + self._range[1]) / 2
 
     def _welcome(self, client: Client) -> None:
-        field = None if self._field is None else messages.field(self._field, self._field_name)
-        welcome = messages.welcome(
-            self._volume, self._title, self._range, self._isovalue, self._first_scene, field
-        )
-        client.post(welcome, None)
+        client.post(self._facts, None)
         if self._histogram is not None:
             client.post(self._histogram, None)
 
@@ -487,13 +550,13 @@ class Scene:
         """Without one the viewer works, too: the slider then has no bars."""
         self._histogram_due = False
         try:
-            counts, edges = self._volume.histogram(bins=256)
+            counts, edges = self._first.histogram(bins=256)
         except Exception as error:
             with self._changed:
                 self._broadcast(messages.error(error, None))
             return
         try:
-            suggested = self._volume.suggested_isovalues()
+            suggested = self._first.suggested_isovalues()
         except Exception:  # _first_isovalue() told of it, or there is no need of any
             suggested = []
         message = messages.histogram(counts, edges, suggested)
@@ -510,6 +573,14 @@ def home(renderer: RendererLike, wish: Wish) -> Camera:
     surfaces = wish.request.surfaces
     isovalue = None if surfaces else wish.request.isovalue
     return renderer.camera(isovalue, wish.size, surfaces=surfaces)
+
+
+def chosen_voxel_pixels(image: ImageLike, frame: Frame) -> float:
+    """Distance between voxels [pixels of the wish] that was chosen to keep the picture's error."""
+    if not frame.extent.chooses:
+        return 0.0
+    chosen = float(image.statistics["detail"]["voxel_pixels"])
+    return chosen * frame.wish.size[1] / frame.extent.size[1]
 
 
 def picture_of(image: ImageLike) -> NDArray[np.uint8]:

@@ -9,28 +9,33 @@ const toHex = (rgb) => `#${rgb.map((part) =>
  * The scene file of what a view shows.
  * @param {State} state
  * @param {string} background "#rrggbb", as it is shown
- * @param {{box: [Vec, Vec], field: ?{name: string}}} volume as in welcome
+ * @param {{box: [Vec, Vec], field: ?{name: string, labels: boolean}}} volume as in welcome
  * @returns {string} JSON, as isowave/scene.hpp describes it
  */
 export function writeScene(state, background, { box, field }) {
   const { camera, caps } = state;
-  const { color_map: map, lights, light, shadow } = lookOf(state);
+  const { color_map: map, lights, light, shadow, bounce } = lookOf(state, field);
+  const name = map?.by === "labels" && !field?.labels ? "volume" : field?.name;
   return JSON.stringify({
     isowave_scene: 1,
     ...(camera && { camera: { eye: camera.eye, at: camera.at, up: camera.up,
       fovy_degrees: camera.fovy_deg } }),
-    surfaces: state.surfaces.filter((s) => s.shown).map(({ isovalue, color, opacity }) =>
-      ({ isovalue, color, opacity })),
+    surfaces: drawnSurfaces(state).map(({ labels, isovalue, color, opacity }) =>
+      ({ ...(labels ? { labels } : { isovalue }), color, opacity })),
     clip: [...clipPlanes(state.clip, box), ...state.planes],
     caps,
+    ...writeSceneSlices(state),
     background,
+    ...(state.background_top && { background_top: state.background_top }),
     ...(map && { color_map: map.colors, color_axis: map.axis }),
     ...(map && map.by !== "axis" && { color_by_field: true, color_caps_alone: map.by === "caps",
-      ...(field?.name && { field: field.name }) }),
+      ...(map.by === "labels" && { color_by_label: true }), ...(name && { field: name }) }),
     ...(map?.range && { color_low: map.range[0], color_high: map.range[1] }),
     ...lights,
     ...(light && { light_direction: light }),
     ...(shadow && { shadow_rays: shadow.rays, light_angle: shadow.angle }),
+    ...(bounce && { bounce_rays: bounce }),
+    ...writeSceneAnnotations(state),
   }, null, 1);
 }
 
@@ -38,23 +43,27 @@ export function writeScene(state, background, { box, field }) {
  * A scene as a view shows it.
  * @param {Record<string, any>} fields as `isowave._core.parse_scene()` gives them; those that are
  *    null or not there have their defaults
- * @param {boolean} hasField whether the server has a second volume, which comes in place of theirs
+ * @param {?{labels: boolean}} field the server's second volume, which comes in place of theirs
+ * @param {boolean} hasLabels whether the volume may have labels
  * @returns {Partial<State>}
  * @throws {Error} that says what this page cannot show
  */
-export function readScene(fields, hasField) {
+export function readScene(fields, field, hasLabels) {
   const { camera, color_map: colors, color_axis: axis = AXES.z, color_low: low } = fields;
-  if (fields.color_by_field && !hasField) {
+  const ofLabels = fields.surfaces.filter(({ labels }) => labels?.length);
+  const isOwn = fields.color_by_label && ["volume", "", null, undefined].includes(fields.field);
+  if (fields.color_by_field && !field && !(isOwn && ofLabels.length)) {
     throw new Error("This page has no second volume to colour by: isowave view --field FILE.");
   }
-  if (fields.slices?.length) throw new Error("This page shows no slices.");
+  if (fields.color_by_label && !field?.labels && !(isOwn && ofLabels.length)) {
+    throw new Error("The second volume has no labels to colour by.");
+  }
   if (fields.surfaces.some(({ clipped }) => clipped === false)) {
     throw new Error('This page cuts all surfaces: leave out "clipped".');
   }
   if (fields.surfaces.some(({ mapped }) => mapped === false)) {
     throw new Error('This page gives all surfaces the map\'s colours: leave out "mapped".');
   }
-  if (fields.background_top) throw new Error("This page shows no gradient as background.");
   if (fields.color_table?.length) throw new Error("This page shows no tables of colours.");
   if (typeof low === "number" && !(Math.max(Math.abs(low), Math.abs(fields.color_high)) <= 1e18)) {
     throw new Error("This page shows colours of values up to 1e18.");
@@ -70,23 +79,32 @@ export function readScene(fields, hasField) {
   if (typeof view?.parallel_height === "number") {
     throw new Error('This page draws in perspective alone: leave out "parallel_height".');
   }
+  if (ofLabels.length && !hasLabels) {
+    throw new Error(`The volume has no labels, which are integers from 0 to ${MAX_LABEL}.`);
+  }
   return {
     camera: view ? checkCamera(view) : null,
-    surfaces: fields.surfaces.map(({ isovalue, color, opacity }) => makeSurface(
-      isovalue, toHex(color), Math.max(opacity, LEAST_OPACITY))),
-    selected: 0,
+    labels: readSceneLabels(ofLabels),
+    ...(!ofLabels.length && { selected: 0,
+      surfaces: fields.surfaces.map(({ isovalue, color, opacity }) => makeSurface(
+        isovalue, toHex(color), Math.max(opacity, LEAST_OPACITY))) }),
     clip: WHOLE,
     planes: fields.clip.map(({ normal, offset }) => (
       { normal: unit(normal), offset: offset / length(normal) })),
     caps: fields.caps ?? true,
+    ...readSceneSlices(fields),
+    ...readSceneAnnotations(fields),
     background: fields.background ? toHex(fields.background) : null,
+    background_top: fields.background_top ? toHex(fields.background_top) : null,
     color_map: colors ? { colors, axis: unit(axis),
-      by: !fields.color_by_field ? "axis" : fields.color_caps_alone ? "caps" : "field",
+      by: !fields.color_by_field ? "axis" : fields.color_by_label ? "labels"
+        : fields.color_caps_alone ? "caps" : "field",
       range: typeof low === "number" ? [low, fields.color_high] : null } : null,
     light: fields.light_direction ? unit(fields.light_direction) : null,
     shadow: fields.light_direction && fields.shadow_rays > 0
       ? { rays: Math.min(fields.shadow_rays, 255),
         angle: clamp(fields.light_angle ?? LIGHT_ANGLE, 0.01, 45) } : null,
+    bounce: Math.min(fields.bounce_rays ?? 0, 255),
     lights: LIGHTS.every((name) => typeof fields[name] === "number")
       ? Object.fromEntries(LIGHTS.map((name) => [name, clamp(fields[name], 0, 10)])) : null,
   };
@@ -140,7 +158,8 @@ class SceneFiles {
   /** Shows the scene of these fields. */
   use(fields) {
     try {
-      this.view.change(readScene(fields, Boolean(this.view.volume?.field)));
+      const { volume, labels } = this.view;
+      this.view.change(readScene(fields, volume?.field, labels.isUseful));
     } catch (error) {
       this.view.note(error.message, "error");
     }

@@ -33,7 +33,7 @@ from websockets.server import ServerProtocol
 
 from .door import HEADERS, Door, Refused, Request, answer, hand_over, parse_head, read_head
 from .front_end import script
-from .interfaces import VolumeLike
+from .interfaces import SeriesLike, VolumeLike
 from .protocol import MAX_MESSAGE_BYTES, ProtocolError, parse
 from .scene import Scene
 from .session import Session, TooManyClients
@@ -440,14 +440,14 @@ def _listen(host: str, port: int) -> socket.socket:
 
 
 def serve(
-    volume: VolumeLike,
+    volume: VolumeLike | SeriesLike,
     *,
     host: str = "127.0.0.1",
     port: int = 0,
     open_browser: bool = True,
     **options: Any,
 ) -> Server:
-    """Serves a view of a volume and opens it in a browser, if there is a display.
+    """Serves a view of a volume, or of a series, and opens it in a browser, if there is a display.
 
     options  as for Scene: isovalue, title, device, memory_budget, size, samples, max_clients,
              max_rays

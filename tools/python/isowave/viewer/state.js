@@ -4,14 +4,15 @@
 /** @typedef {[number, number, number]} Vec */
 /** @typedef {{eye: Vec, at: Vec, up: Vec, fovy_deg: number}} Camera world space */
 /** @typedef {{surfaces: Surface[], selected: number, camera: ?Camera,
- *    background: ?string, samples: number, max_error: ?number, by: string, time_budget: ?number,
- *    ambient: number, clip: number[], caps: boolean, color_map: ?ColorMap,
+ *    background: ?string, background_top: ?string, samples: number, max_error: ?number, by: string,
+ *    time_budget: ?number, ambient: number, clip: number[], caps: boolean, color_map: ?ColorMap,
  *    planes: {normal: Vec, offset: number}[], lights: ?Record<string, number>, light: ?Vec,
- *    shadow: ?Shadow}} State
+ *    shadow: ?Shadow, bounce: number, slices: Slice[], slice_map: SliceMap, labels: Group[],
+ *    step: number, annotations: Annotations}} State
  *    what the URL keeps, but for the surface that is selected. clip: from and to along x, y and z
- *    [% of the volume's box]. planes: further clipping planes, of a scene file */
-
-const AMBIENT = [8, 16, 32, 64]; // rays of a hit that one can choose
+ *    [% of the volume's box]. planes: further clipping planes, of a scene file. step: of a
+ *    series, from 0. bounce: rays of a hit that bring light. background_top: colour at the upper
+ *    edge, to which the background goes */
 
 // Colours and numbers as messages and elements have them.
 const toRgb = (hex) => [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16) / 255);
@@ -124,14 +125,13 @@ export function writeHash(state) {
   const { camera } = state;
   const parts = writeSurfaces(state.surfaces);
   if (state.background) parts.background = state.background.slice(1);
-  if (state.samples > 1) parts.samples = state.samples;
-  if (state.max_error) parts.error = short(state.max_error);
-  if (state.max_error && state.by === "sample") parts.by = state.by;
-  if (state.time_budget) parts.ms = short(state.time_budget);
-  if (state.ambient) parts.ambient = state.ambient;
+  if (state.background_top) parts.top = state.background_top.slice(1);
+  Object.assign(parts, writeQuality(state));
   if (state.clip.some((percent, i) => percent !== WHOLE[i])) parts.clip = state.clip.join(",");
   if (!state.caps) parts.caps = 0;
-  Object.assign(parts, writeLook(state));
+  Object.assign(parts, writeLook(state), writeSlices(state), writeLabels(state),
+    writeAnnotations(state));
+  if (state.step) parts.step = state.step;
   if (camera) {
     for (const key of ["eye", "at", "up"]) parts[key] = camera[key].map(short).join(",");
     parts.fovy = short(camera.fovy_deg);
@@ -163,14 +163,15 @@ export function readHash(hash, before) {
     surfaces,
     selected: surfaces && 0,
     background: color("background"),
-    samples: [1, 2, 3, 4].find((n) => n === number("samples", 1, 4)),
-    max_error: number("error", 0.001, 1000),
-    by: ["proof", "sample"].find((by) => by === parts.get("by")),
-    time_budget: parts.has("error") ? undefined : number("ms", 1, 10000),
-    ambient: [0, ...AMBIENT].find((n) => n === number("ambient", 0, 255)),
+    background_top: color("top"),
+    ...readQuality(parts, number, before),
     clip: [vector("clip")].find(isClip),
     caps: number("caps", 0, 0) === 0 ? false : undefined,
     ...readLook(parts),
+    ...readSlices(parts),
+    ...readLabels(parts),
+    ...readAnnotations(parts),
+    step: [number("step", 0, 1e9)].find(Number.isInteger),
   };
   if (parts.has("eye")) {
     try {
@@ -180,5 +181,6 @@ export function readHash(hash, before) {
       // A camera that cannot be used: the view stays as it is.
     }
   }
-  return Object.fromEntries(Object.entries(state).filter(([, v]) => v !== undefined));
+  const understood = Object.fromEntries(Object.entries(state).filter(([, v]) => v !== undefined));
+  return fitSlices(before, understood);
 }

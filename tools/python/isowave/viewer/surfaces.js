@@ -9,35 +9,39 @@ const ADDED_OPACITY = 0.5; // what is behind it is seen
 // As the library colours them.
 const COLORS = ["#dbbd87", "#56b4e9", "#d55e00", "#009e73", "#cc79a7", "#0072b2", "#f0e442",
   "#e69f00"];
-const WITHOUT_SURFACES = ["max_error", "by", "time_budget"]; // fields of no use then
 
 /** @returns {Surface} */
 const makeSurface = (isovalue, color = COLORS[0], opacity = 1, shown = true) =>
   ({ isovalue, color, opacity, shown });
 
-/** @returns {boolean} whether one opaque surface is drawn, with all that quality has */
-export function isPlain(surfaces) {
-  const shown = surfaces.filter((s) => s.shown);
-  return shown.length === 1 && shown[0].opacity === 1;
-}
+/** The surfaces that a State shows: those of labels, or of isovalues. */
+const drawnSurfaces = (state) =>
+  (drawsLabels(state) ? state.labels : state.surfaces).filter((s) => s.shown);
+
+/** @returns {boolean} whether one opaque isosurface is drawn; a wish needs no list of it */
+const isOne = (drawn) => drawn.length === 1 && drawn[0].opacity === 1 && !drawn[0].labels;
+
+/** @returns {boolean} whether one opaque isosurface is drawn alone, with all that quality has */
+export const isPlain = (state) => isOne(drawnSurfaces(state)) && state.slices.length === 0;
 
 /** @returns {boolean} whether ambient and shadow rays can end at a surface */
-export const hasOpaque = (surfaces) => surfaces.some((s) => s.shown && s.opacity === 1);
+export const hasOpaque = (state) => drawnSurfaces(state).some((s) => s.opacity === 1);
 
 /** @returns {boolean} whether the values of a second volume are shown, without a time budget */
 const isByField = (map) => map !== null && map.by !== "axis";
 
-/** A State as a wish's surfaces and quality. One opaque surface needs no list. */
-export function wishedSurfaces({ surfaces, max_error, by, time_budget: time, ambient,
-  color_map: map }) {
-  const shown = surfaces.filter((s) => s.shown);
-  const first = { isovalue: shown[0].isovalue, color: toRgb(shown[0].color), by };
-  const time_budget = isByField(map) ? null : time;
-  if (isPlain(surfaces)) return { ...first, surfaces: [], max_error, time_budget, ambient };
-  const list = shown.map(({ isovalue, color, opacity }) =>
-    ({ isovalue, color: toRgb(color), opacity }));
-  return { ...first, surfaces: list, max_error: null, time_budget: null,
-    ambient: hasOpaque(surfaces) ? ambient : 0 };
+/** A State as a wish's surfaces and slices. */
+export function wishedSurfaces(state) {
+  const { surfaces, slices, slice_map } = state;
+  const [drawn, first] = [drawnSurfaces(state), surfaces.find((s) => s.shown)];
+  return {
+    isovalue: first.isovalue,
+    color: toRgb(first.color),
+    surfaces: isOne(drawn) ? [] : drawn.map(({ labels, isovalue, color, opacity }) =>
+      ({ ...(labels ? { labels } : { isovalue }), color: toRgb(color), opacity })),
+    slices: drawsLabels(state) ? [] : slices,
+    slice_map,
+  };
 }
 
 /** The surfaces with one more, at a suggested isovalue or in the middle of the widest gap. */
@@ -130,8 +134,9 @@ class SurfaceList {
     this.view.field("add").focus(); // the row that had the focus may be gone
   }
 
-  show({ surfaces, selected, color_map: map }) {
+  show(state) {
     const { list, view } = this;
+    const { surfaces, selected, color_map: map } = state;
     while (list.children.length > surfaces.length) list.lastElementChild.remove();
     while (list.children.length < surfaces.length) this.addRow(list.children.length);
     const count = surfaces.filter((s) => s.shown).length;
@@ -152,10 +157,7 @@ class SurfaceList {
       eye.disabled = surface.shown && count === 1;
       remove.disabled = surfaces.length === 1;
     });
-    view.field("add").disabled = surfaces.length === MAX_SURFACES;
-    for (const name of WITHOUT_SURFACES) view.field(name).disabled = !isPlain(surfaces);
-    view.field("ambient").disabled = !hasOpaque(surfaces);
-    if (isByField(map)) view.field("time_budget").disabled = true;
+    view.field("add").disabled = isFull(state) || drawsLabels(state);
   }
 
   addRow(i) {

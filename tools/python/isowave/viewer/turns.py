@@ -15,6 +15,7 @@ from isowave._camera import Camera
 
 from .pictures import Extent
 from .protocol import ProtocolError, Wish
+from .steps import Steps
 
 MAX_IN_FLIGHT: Final = 2  # pictures on the way to a client
 QUICK_SECONDS: Final = 0.02  # a whole picture that needs no first one
@@ -47,6 +48,8 @@ class Client:
     camera: Camera | None = None  # of the wish, once it is known
     gave_way: int = 0  # how often the wish's whole picture was interrupted for another client
     due: float = -math.inf  # when the stage may begin
+    ranges: tuple[Any, Any] = (None, None)  # of the wish's colours, once they are known
+    voxel_pixels: float = 0.0  # chosen for the wish's whole picture, to keep the picture's error
     lossless: tuple[dict[str, Any], NDArray[np.uint8]] | None = None  # what it is made of
     sent: int = 0  # pictures, numbered from 1
     acked: int = 0
@@ -63,6 +66,7 @@ class Client:
         self.wish, self.camera = wish, wish.request.camera
         self.stage = Stage.WHOLE if skip_first else Stage.FIRST
         self.gave_way, self.lossless, self.due = 0, None, -math.inf
+        self.ranges, self.voxel_pixels = (None, None), 0.0
 
     def leave(self) -> None:
         self.joined = False
@@ -107,6 +111,7 @@ class Frame:
     camera: Camera
     began: float
     extent: Extent
+    ranges: tuple[Any, Any]  # of its colours and its slices' colours, for annotations
     passes: int = 0
     percent: float = 0.0  # of its rays that have ended
     by_host: bool = False
@@ -119,10 +124,19 @@ class Turns:
     """The clients, in the order of their turns. All calls need the scene's lock.
 
     can_draw  whether there is a renderer for a stage
+    suits     whether the renderer is of a wish's step, and draws labels if it has some: such
+              wishes come first
+    steps     of the series
     """
 
-    def __init__(self, can_draw: Callable[[Stage], bool], clock: Callable[[], float]) -> None:
-        self._can_draw, self._clock = can_draw, clock
+    def __init__(
+        self,
+        can_draw: Callable[[Stage], bool],
+        suits: Callable[[Wish], bool],
+        steps: Steps,
+        clock: Callable[[], float],
+    ) -> None:
+        self._can_draw, self._suits, self._steps, self._clock = can_draw, suits, steps, clock
         self.clients: list[Client] = []
 
     def wishes(self) -> list[Wish]:
@@ -138,16 +152,50 @@ class Turns:
         return None
 
     def due(self) -> list[float]:
-        """When clients' stages may begin that only wait for their time."""
-        return [client.due for client in self.clients if self._may_begin(client)]
+        """When clients' stages may begin that only wait for their time; -inf: at once."""
+        due = (self._due(client) for client in self.clients if self._may_begin(client))
+        return [when for when in due if when < math.inf]
 
     def has_turn(self, client: Client) -> bool:
-        return self._may_begin(client) and self._clock() >= client.due
+        return self._may_begin(client) and self._clock() >= self._due(client)
+
+    def step_to_read(self) -> int | None:
+        """The step of the first client in the row that waits for another renderer."""
+        for client in self.clients:
+            if self._needs_other_renderer(client) and client.stage is not Stage.CERTAIN:
+                assert client.wish is not None
+                return client.wish.step
+        return None
+
+    def _due(self, client: Client) -> float:
+        """When the client's stage may begin.
+
+        A client who needs another renderer waits while this one is being made, and then for
+        clients whom this one suits, until this one has had its time.
+        """
+        if not self._needs_other_renderer(client):
+            return client.due
+        leave_at = self._steps.leave_at
+        stays = any(
+            other.stage in (Stage.FIRST, Stage.WHOLE) and not self._needs_other_renderer(other)
+            for other in self.clients
+        )
+        return max(client.due, leave_at) if stays or math.isinf(leave_at) else client.due
+
+    def _needs_other_renderer(self, client: Client) -> bool:
+        """Whether the client's stage needs a renderer of another step, or of labels."""
+        needs_renderer = client.stage in (Stage.FIRST, Stage.WHOLE, Stage.CERTAIN)
+        return needs_renderer and client.wish is not None and not self._suits(client.wish)
 
     def _may_begin(self, client: Client) -> bool:
         """Whether there is all that the client's stage needs, but for time."""
         if client.stage in (Stage.DONE, Stage.ENCODING, Stage.LOSSLESS):
             return client.stage is Stage.LOSSLESS
+        if self._needs_other_renderer(client):
+            assert client.wish is not None
+            # Bounds are not worth another renderer.
+            if client.stage is Stage.CERTAIN or not self._steps.may_draw(client.wish.step):
+                return False
         return self._can_draw(client.stage)
 
     def give_way(self, frame: Frame, now: float, fitted: Callable[[Wish, Stage], Extent]) -> bool:

@@ -5,14 +5,19 @@
 //
 //   welcome    title, shape [z,y,x], spacing, box [[x,y,z], [x,y,z]] in world space, dtype,
 //              range [low, high], bits_per_voxel, max_error of voxels, isovalue, scene: fields of
-//              the scene to show at first, or null; field: name and range of the second volume
-//              ("volume": the same one), or null
+//              the scene to show at first, or null; annotations: those to show at first, as in
+//              wishes, or null: the scene's; field: name, range of the second volume
+//              ("volume": the same one), and labels: whether it may have some; or null; steps:
+//              names of a series' steps, or null. The facts are those of its first step, and all
+//              steps have one box
 //   status     state: starting, ready, failed; device ("host": none), notice (what it computes
 //              otherwise than the host, or ""), device_memory (null on the host), memory_bytes,
 //              memory_budget, nbytes of the compressed volume
 //   histogram  counts of equally wide bins, range, suggested isovalues
-//   picture    wish, frame, stage: first, pass, whole, lossless; format, size, samples, ambient,
-//              shadow, camera, isovalue, complete, passes, decoded_blocks, percent, ms, detail;
+//   picture    wish, step, frame, stage: first, pass, whole, lossless; format, size, samples,
+//              ambient, shadow, bounce, camera, isovalue, complete, passes, decoded_blocks,
+//              percent, ms, detail; samples: of one whose rays are chosen, before it is finished,
+//              the most;
 //              rays_cut: of a finished one, how many rays have more hits than are drawn;
 //              field_range: of a finished one, the least and the largest value of the field at the
 //              hits, or null;
@@ -34,7 +39,7 @@
  *    isDark: () => boolean}} Home where a view is. wheel: whether the wheel is the view's
  */
 
-const VERSION = 7;
+const VERSION = 11;
 const MIN_WAIT_MS = 15; // between two wishes
 const MAX_IN_WAIT_MS = 120; // for a picture of the last wish, before the next one is sent
 const MAX_PIXEL_RATIO = 2;
@@ -67,11 +72,17 @@ class View {
     this.state = { surfaces: [makeSurface(NaN)], selected: 0, camera: null, background: null,
       samples: 1, max_error: null, by: "proof", time_budget: null, ambient: 0, clip: WHOLE,
       caps: true, color_map: null, planes: [], lights: null, light: null,
-      shadow: null };
+      background_top: null, shadow: null, bounce: 0, slices: [], slice_map: GRAY, labels: [],
+      step: 0, annotations: NO_ANNOTATIONS };
     if (home.hash) Object.assign(this.state, readHash(location.hash, this.state));
     this.isNew = !(home.hash && location.hash.length > 1); // shows the server's scene first
     this.surfaces = new SurfaceList(this);
+    this.quality = new QualityRows(this);
     this.look = new Look(this);
+    this.slices = new SliceList(this);
+    this.labels = new LabelList(this);
+    this.annotations = new AnnotationRows(this);
+    this.time = new Timeline(this);
     this.scenes = new SceneFiles(this);
     this.wish = 0;
     this.shown = this.arrived = { wish: -1, frame: -1 };
@@ -112,8 +123,9 @@ class View {
     this.find(".volume").textContent =
       `${x} × ${y} × ${z} ${head.dtype}, ${toShort(head.bits_per_voxel)} bits per voxel`;
     if (this.home.hash && head.title) document.title = `${head.title} – isowave`;
-    this.look.welcome(head);
+    for (const part of [this.look, this.labels, this.annotations, this.time]) part.welcome(head);
     if (this.isNew && head.scene) this.scenes.use(head.scene);
+    if (this.isNew && head.annotations) this.state.annotations = head.annotations;
     this.isNew = false;
     if (!Number.isFinite(this.surface.isovalue)) this.surface.isovalue = head.isovalue;
     this.setRange(head.range);
@@ -154,6 +166,8 @@ class View {
     if (head.wish !== null) {
       this.answered = this.failed = true;
       this.progress(100);
+      this.time.play(false);
+      this.time.came(false);
     }
     this.note(head.message, head.wish === null ? "error" : "drawing");
   }
@@ -198,6 +212,7 @@ class View {
     if (!this.state.camera) this.state.camera = head.camera;
     const rest = head.stage === "whole" || head.stage === "lossless";
     this.progress(rest ? 100 : head.percent ?? 50);
+    this.time.came(rest);
     if (rest) this.list(".facts", factsOf(head, this.state));
     const notes = [head.notice, head.reduced].filter(Boolean);
     if (rest && notes.length) this.note(notes.join(" "), "drawing");
@@ -243,7 +258,7 @@ class View {
     this.scheduled = requestAnimationFrame(() => {
       this.scheduled = 0;
       const waited = performance.now() - this.sentAt;
-      const left = (this.answered ? MIN_WAIT_MS : MAX_IN_WAIT_MS) - waited;
+      const left = (this.answered ? MIN_WAIT_MS : this.time.patience) - waited;
       if (left > 0) this.held = setTimeout(() => this.sendHeldBack(), left);
       else this.sendWish();
     });
@@ -262,7 +277,7 @@ class View {
     const { width, height } = this.picture.getBoundingClientRect();
     if (!(width >= 1 && height >= 1)) return; // hidden: the observer pushes when it is not
     const ratio = Math.min(devicePixelRatio, MAX_PIXEL_RATIO);
-    const { clip, planes, camera, samples, caps } = this.state;
+    const { clip, planes, camera, caps } = this.state;
     this.wish += 1;
     this.answered = false;
     this.sentAt = performance.now();
@@ -273,14 +288,17 @@ class View {
       type: "wish",
       id: this.wish,
       size: [width, height].map((side) => clamp(Math.round(side * ratio), 1, 8192)),
+      step: this.time.step,
       camera,
-      samples,
       background: toRgb(this.backgroundShown()),
       clip: [...clipPlanes(clip, this.volume.box), ...planes],
       caps,
-      ...lookOf(this.state),
+      ...lookOf(this.state, this.volume.field),
       ...wishedSurfaces(this.state),
+      ...wishedQuality(this.state),
+      ...wishedAnnotations(this.state),
     });
+    this.time.wished();
   }
 
   /** Changes the state, shows it, wishes for it. */
@@ -322,14 +340,10 @@ class View {
     this.set("isovalue", value);
     this.field("slider").value = isovalue;
     this.field("slider").setAttribute("aria-valuetext", value);
-    this.surfaces.show(state);
-    for (const name of ["samples", "ambient", "by"]) this.field(name).value = state[name];
-    this.field("background").value = this.backgroundShown();
-    this.set("max_error", state.max_error ?? "");
-    this.set("time_budget", state.time_budget ?? "");
     this.clips.forEach((slider, i) => { slider.value = state.clip[i]; });
     this.field("caps").checked = state.caps;
-    this.look.show(state);
+    for (const part of [this.labels, this.surfaces, this.quality, this.look, this.slices,
+      this.annotations, this.time]) part.show(state);
     this.drawHistogram();
   }
 
@@ -473,27 +487,16 @@ class View {
   }
 
   listenToFields(on) {
-    const number = (name, type, optional) => on(this.field(name), type, () => {
-      const field = this.field(name);
-      const value = field.value ? Number(field.value) : optional;
-      if (field.validity.valid) this.change({ [name]: value });
-    });
-    number("max_error", "change", null);
-    number("time_budget", "change", null);
-    on(this.field("by"), "change", (e) => this.change({ by: e.target.value }));
-    number("samples", "change");
-    number("ambient", "change");
     for (const name of ["isovalue", "slider"]) {
       on(this.field(name), "input", ({ target }) => target.validity.valid
         && this.surfaces.edit(this.state.selected, { isovalue: Number(target.value) }));
     }
-    on(this.field("background"), "input", (e) => this.change({ background: e.target.value }));
     on(this.field("add"), "click", () => this.surfaces.add());
     this.clips.forEach((slider, i) => on(slider, "input", () =>
       this.change({ clip: moveClip(this.state.clip, i, Number(slider.value)) })));
     on(this.field("caps"), "change", (e) => this.change({ caps: e.target.checked }));
-    this.look.listen(on);
-    this.scenes.listen(on);
+    for (const part of [this.quality, this.look, this.slices, this.labels, this.annotations,
+      this.time, this.scenes]) part.listen(on);
     on(this.find(".budget"), "submit", (e) => this.sendBudget(e));
     on(this.field("budget"), "change", (e) => this.sendBudget(e));
     on(this.find(".toggle"), "click", () => this.setOpen(this.find(".closed") !== null));
@@ -528,7 +531,9 @@ class View {
 
   download() {
     this.wantsShot = false;
-    saveAs(this.lossless.blob, `isowave_${toText(this.surface.isovalue)}.png`);
+    const step = this.time.names.length > 1 ? `_step${this.time.shown}` : "";
+    const what = drawsLabels(this.state) ? "labels" : toText(this.surface.isovalue);
+    saveAs(this.lossless.blob, `isowave_${what}${step}.png`);
   }
 
   cameraText() {

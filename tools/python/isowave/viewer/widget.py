@@ -14,7 +14,7 @@ import anywidget
 import traitlets
 
 from .front_end import script
-from .interfaces import VolumeLike
+from .interfaces import SeriesLike, VolumeLike
 from .protocol import ProtocolError
 from .scene import Scene
 from .session import Session, TooManyClients
@@ -98,8 +98,10 @@ _lock = threading.Lock()
 _scenes: dict[tuple[Any, ...], tuple[Scene, int]] = {}  # in use, and by how many widgets
 
 
-def show(volume: VolumeLike, *, height: int = 540, **options: Any) -> Widget:
-    """Shows a volume in a widget. Widgets of one volume and the same options share a renderer.
+def show(volume: VolumeLike | SeriesLike, *, height: int = 540, **options: Any) -> Widget:
+    """Shows a volume, or a series, in a widget.
+
+    Widgets of one volume and the same options share a renderer.
 
     options  as for Scene
     """
