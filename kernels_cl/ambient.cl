@@ -5,7 +5,8 @@
 ///
 /// If a frame has several surfaces, the hits of each layer have such rays. A ray may meet each of
 /// the opaque surfaces: it goes through pipeline `rays` once for each, and ambient_block takes out
-/// what has met one.
+/// what has met one. Surfaces that clipping planes leave whole come first; then ambient_enter moves
+/// rays that begin in what the planes have taken away.
 #include "device/level_borders.h"
 #include "device/light_rays.h"
 #include "portable/ambient.h"
@@ -79,5 +80,20 @@ kernel void ambient_block(const FrameParams frame_params, global const ClipParam
     } else {
       given[pixel] = no_ray();
     }
+  }
+}
+
+/// Moves the rays of a round to where they enter what is left of clipped surfaces: entering().
+///
+/// frame_params, clip, first_level  as ambient
+/// In, Out  given [pixel]
+/// Launch   grid-stride over pixels
+kernel void ambient_enter(const FrameParams frame_params, global const ClipParams *clip,
+                          uint first_level, global GivenRay *given) {
+  const FrameParams *frame = &frame_params;
+  const uint num_pixels = frame->view.width * frame->view.height;
+  for (uint pixel = get_global_id(0); pixel < num_pixels; pixel += get_global_size(0)) {
+    if (is_given(given[pixel]))
+      given[pixel] = entering(clip, given[pixel], voxel_of(first_level, given[pixel]));
   }
 }

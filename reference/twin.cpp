@@ -82,8 +82,11 @@ struct Caster {
 /// The light rays of hits in layers.
 class LayerLight {
  public:
-  LayerLight(const LightRays &rays, const VolumeInfo &info, const std::vector<float> &voxels)
+  /// any_is_whole: any_is_whole() of the surfaces
+  LayerLight(const LightRays &rays, const VolumeInfo &info, const std::vector<float> &voxels,
+             bool any_is_whole)
       : rays_(rays),
+        any_is_whole_(any_is_whole),
         params_(make_ambient_params(info, rays.num_ambient)),
         directions_(make_light_directions(rays)),
         voxels_(voxels) {}
@@ -108,14 +111,16 @@ class LayerLight {
  private:
   bool meets_any(const GivenRay &given) const {
     return std::ranges::any_of(casters_, [&](const Caster &caster) {
+      const GivenRay ray = any_is_whole_ ? entering(&caster.clip, given, 1.0f) : given;
       const HitRecord met =
-          trace_scalar(caster.frame, voxels_, kDefaultSolver, make_given_ray(given));
+          trace_scalar(caster.frame, voxels_, kDefaultSolver, make_given_ray(ray));
       return std::isfinite(met.t) &&
-             !is_clipped(&caster.clip, given, 1.0f, met.t / caster.frame.view.t_scale);
+             !is_clipped(&caster.clip, ray, 1.0f, met.t / caster.frame.view.t_scale);
     });
   }
 
   LightRays rays_;
+  bool any_is_whole_;
   AmbientParams params_;
   std::vector<AmbientDirection> directions_;
   const std::vector<float> &voxels_;
@@ -170,7 +175,7 @@ LayeredFrame Twin::render_layers(const FrameRequest &request, const FieldTwin *f
       make_layer_shading(finest, request, has_field ? field->volume_range() : std::nullopt);
   const LayerParams colors =
       make_layer_params(surfaces, request.slices, finest, frames[0].view, request.camera);
-  LayerLight lights(light_rays, finest, voxels_[0]);
+  LayerLight lights(light_rays, finest, voxels_[0], any_is_whole(surfaces));
   for (std::size_t k = 0; k < order.size(); ++k) {
     const SurfaceStyle &surface = surfaces[order[k]];
     if (surface.opacity == 1) lights.add({frames[k], surface.clipped ? clip : ClipParams{}});

@@ -19,81 +19,19 @@
 #include "core/bricks/ranks.hpp"
 #include "core/frame/timed_renderer.hpp"
 #include "core/view/detail.hpp"
-#include "tests/frame_scene.hpp"
-#include "tests/test_devices.hpp"
-#include "tests/thread_meeting.hpp"
+#include "tests/brick_team.hpp"
 
 namespace isowave::core {
 namespace {
 
 using test::camera_along;
 using test::TestVolume;
+using test::ThreadTeam;
 
-class ThreadTeam : public Team {
- public:
-  ThreadTeam(test::ThreadMeeting &meeting, std::uint32_t rank) : meeting_(meeting), rank_(rank) {}
-  std::uint32_t rank() const override { return rank_; }
-  std::uint32_t size() const override { return meeting_.size(); }
-  std::vector<std::string> all_gather(const std::string &text) override {
-    return meeting_.all_gather(rank_, text);
-  }
-  void reduce(std::size_t count, Reduction how, Receiver who, const MakeWords &make,
-              const TakeWords &take) override {
-    const bool for_all = who == Receiver::kAll;
-    reduce_in_pieces(count, for_all || rank_ == 0, make, take, [&](std::span<std::uint64_t> words) {
-      meeting_.reduce(rank_, words, how, for_all);
-    });
-  }
+constexpr float kIsovalue = test::kBrickIsovalue;
+constexpr ImageSize kFrame = test::kBrickFrame;
 
- private:
-  test::ThreadMeeting &meeting_;
-  std::uint32_t rank_;
-};
-
-constexpr float kIsovalue = 0.2f;
-constexpr ImageSize kFrame{49, 33};
-
-class BrickTeamOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
- protected:
-  void SetUp() override {
-    if (is_llvmpipe(GetParam()) && !long_tests())
-      GTEST_SKIP() << "llvmpipe takes minutes to compile the kernels of bricks";
-  }
-
-  using Work = std::function<void(TeamRenderer &renderer, std::uint32_t rank)>;
-
-  /// Each rank of a team does this with its brick.
-  void on_ranks(std::uint32_t size, const RendererOptions &options, const Work &work) {
-    const Cuts cuts(blocks_along(volume_.info()), size);
-    const std::vector<VolumeInfo> whole{volume_.info()};
-    test::ThreadMeeting meeting(size);
-    std::vector<std::jthread> threads;
-    for (std::uint32_t rank = 0; rank < size; ++rank) {
-      threads.emplace_back([&, rank] {
-        ThreadTeam team(meeting, rank);
-        ocl::Device device(GetParam());
-        const CompressedVolume brick = cut_brick(volume_.compressed, cuts.bricks()[rank]);
-        std::optional<TeamRenderer> renderer;
-        in_turns(team, rank == 0,
-                 [&] { renderer.emplace(device, brick, options, cuts, whole, team); });
-        work(*renderer, rank);
-      });
-    }
-  }
-
-  /// What one renderer draws.
-  Image8 picture_of_one(const FrameRequest &request, const RendererOptions &options,
-                        const Appearance &appearance = {}) {
-    ocl::Device device(GetParam());
-    DeviceRenderer renderer(device, volume_.compressed, options);
-    renderer.render(request);
-    return renderer.shade(appearance);
-  }
-
-  TestVolume volume_{{37, 30, 26}, test::gyroid_field(9)};
-  Camera camera_ = orbit_cameras(volume_.info(), 3)[1];
-  FrameRequest request_{.camera = camera_, .isovalue = kIsovalue};
-};
+class BrickTeamOnDevice : public test::BrickTeam {};
 INSTANTIATE_TEST_SUITE_P(Devices, BrickTeamOnDevice, testing::ValuesIn(devices_under_test()),
                          device_test_name);
 

@@ -66,16 +66,18 @@ struct TeamHeld {
   Turns turns;
   std::unique_ptr<Device::Implementation> device{};
   std::optional<core::TeamVolume> volume{};
+  core::CompressedVolume field{};  ///< of a file of its own
   std::vector<std::string> notices{};
 };
 
 /// A text of the options in which all processes must agree.
 std::string text_of(const BrickOptions &options, const core::Storage &storage) {
   const RendererOptions &renderer = options.renderer;
-  return fmt::format("{} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {}", renderer.largest.width,
-                     renderer.largest.height, renderer.largest.samples, renderer.with_levels,
-                     renderer.with_bounds, renderer.with_time_budget, renderer.with_rays,
-                     renderer.with_surfaces, options.bricks, storage.rate.value_or(0),
+  return fmt::format("{} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {}",
+                     renderer.largest.width, renderer.largest.height, renderer.largest.samples,
+                     renderer.with_levels, renderer.with_bounds, renderer.with_time_budget,
+                     renderer.with_rays, renderer.with_surfaces, renderer.with_labels,
+                     options.bricks, options.field.string(), storage.rate.value_or(0),
                      storage.tolerance.value_or(0), storage.relative_tolerance.value_or(0),
                      storage.exact, storage.levels, storage.map_nan.value_or(0),
                      storage.no_data ? fmt::to_string(*storage.no_data) : "none");
@@ -91,7 +93,7 @@ void open(TeamHeld &held, const std::string &path, const Compression &compressio
   source.bricks = options.bricks;
   core::together(team, [&] {
     if (options.renderer.field)
-      throw core::Error("a team draws without colours by a field: leave out field");
+      throw core::Error("a team's field is a file: give BrickOptions::field");
     source.storage = storage_for(path, compression);
     source.storage.measure_error |= options.renderer.with_bounds;
     source.overrides = to_overrides(raw);
@@ -109,6 +111,16 @@ void open(TeamHeld &held, const std::string &path, const Compression &compressio
       throw core::Error("{}: bricks have levels of detail that are in a .zfp file: convert it",
                         path);
   });
+  const std::string field = options.field.string();
+  if (field.empty() || field == path) return;
+  core::together(team, [&] {
+    source.storage = storage_for(field, core::is_zfp_name(field) ? Compression{} : compression);
+    source.storage.encoder = core::encoder_on(held.device->device);
+    source.storage.noise = core::noise_on(held.device->device.info());
+  });
+  source.path = field;
+  source.overrides = {};
+  held.field = core::open_field_together(team, source, *held.volume);
 }
 
 }  // namespace
@@ -117,8 +129,6 @@ Renderer make_team_renderer(Processes &processes, const std::filesystem::path &p
                             const Compression &compression, const RawFile &raw,
                             const BrickOptions &options) {
   return guarded("making a renderer", [&] {
-    if (options.renderer.with_labels)
-      throw core::Error("labels are drawn by one process alone: leave out with_labels");
     const auto held = std::make_shared<TeamHeld>(processes);
     open(*held, path.string(), compression, raw, options);
     const core::TeamVolume &volume = held->volume.value();
@@ -126,10 +136,12 @@ Renderer make_team_renderer(Processes &processes, const std::filesystem::path &p
     // Processes do not say which of them share a host: on CPUs all wait for the first.
     const bool is_on_cpu = held->device->device.info().type == core::ocl::DeviceType::kCpu;
     core::in_turns(held->team, !is_on_cpu || held->team.rank() == 0, [&] {
-      renderer = std::make_unique<core::TeamRenderer>(
-          held->device->device, volume,
-          core_options(options.renderer, static_cast<std::uint32_t>(volume.num_levels)),
-          held->team);
+      core::RendererOptions of_core =
+          core_options(options.renderer, static_cast<std::uint32_t>(volume.num_levels));
+      if (!options.field.empty())
+        of_core.field = options.field.string() == path.string() ? &volume.brick : &held->field;
+      renderer = std::make_unique<core::TeamRenderer>(held->device->device, volume,
+                                                      std::move(of_core), held->team);
     });
     auto result = std::make_unique<Renderer::Implementation>(
         std::shared_ptr<Turns>(held, &held->turns), volume.brick,

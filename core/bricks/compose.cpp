@@ -44,6 +44,19 @@ void set_field(std::span<const std::uint64_t> words, HitField field, std::span<H
   }
 }
 
+void number_words(std::span<const HitRecord> hits, std::span<const float> numbers,
+                  std::uint32_t place, std::span<std::uint64_t> words) {
+  for (std::size_t ray = 0; ray < hits.size(); ++ray)
+    words[ray] = make_word(hits[ray], place, std::bit_cast<std::uint32_t>(numbers[ray]));
+}
+
+void set_numbers(std::span<const std::uint64_t> words, std::span<float> numbers) {
+  for (std::size_t ray = 0; ray < words.size(); ++ray) {
+    if (words[ray] >> 32 != kNoPlace)
+      numbers[ray] = std::bit_cast<float>(static_cast<std::uint32_t>(words[ray]));
+  }
+}
+
 void color_words(std::span<const std::uint32_t> colors, std::uint32_t place,
                  std::span<std::uint64_t> words) {
   std::ranges::transform(colors, words.begin(), [place](std::uint32_t color) {

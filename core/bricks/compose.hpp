@@ -29,6 +29,12 @@ void field_words(std::span<const HitRecord> hits, HitField field, std::uint32_t 
 /// Gives hits [ray] the field that won.
 void set_field(std::span<const std::uint64_t> words, HitField field, std::span<HitRecord> hits);
 
+/// The same of a number of each hit.
+void number_words(std::span<const HitRecord> hits, std::span<const float> numbers,
+                  std::uint32_t place, std::span<std::uint64_t> words);
+/// Gives rays [ray] that hit the number that won.
+void set_numbers(std::span<const std::uint64_t> words, std::span<float> numbers);
+
 /// words [ray]: a brick's picture, of one ray a pixel, as DeviceRenderer::shade_packed() has it.
 void color_words(std::span<const std::uint32_t> colors, std::uint32_t place,
                  std::span<std::uint64_t> words);

@@ -12,6 +12,7 @@
 #include "core/base/ms_since.hpp"
 #include "core/bricks/ranks.hpp"
 #include "core/frame/ambient_rays.hpp"
+#include "core/frame/field_values.hpp"
 #include "core/frame/surface_camera.hpp"
 #include "core/view/detail.hpp"
 
@@ -74,13 +75,15 @@ FrameStats TeamRenderer::render(const FrameRequest &request) {
   const FrameRequest own = without_light_rays(request);
   FrameStats stats;
   if (!request.surfaces.empty()) {
-    draw_layers(own, stats);
-  } else if (request.on_pass) {
-    stats = render_in_step(own);
+    draw_layers(request, stats);
   } else {
-    together(team_, [&] { stats = renderer_.render(own); });
+    if (request.on_pass) {
+      stats = render_in_step(own);
+    } else {
+      together(team_, [&] { stats = renderer_.render(own); });
+    }
+    if (light_rays_of(request).count() != 0 && !stats.cancelled) add_ambient(request, stats);
   }
-  if (light_rays_of(request).count() != 0 && !stats.cancelled) add_ambient(request, stats);
   stats.complete = !stats.cancelled;
   return stats;
 }
@@ -147,40 +150,60 @@ void TeamRenderer::enlarge_kept(const FrameRequest &request) {
   if (!has_whole_) own_hits_.clear();
 }
 
-/// All ranks get the hits that are seen, and each casts their rays through its brick. A ray is open
-/// if it meets nothing in any.
+Camera TeamRenderer::label_camera(std::span<const std::uint16_t> labels,
+                                  std::optional<ImageSize> size, std::uint32_t num_views) {
+  if (!abilities().labels) return Renderer::label_camera(labels, size, num_views);
+  std::optional<BlockBox> own;
+  together(team_, [&] { own = renderer_.label_box(labels); });
+  return surface_camera(whole_levels_.front(), gather_box(team_, brick_, own),
+                        size.value_or(abilities().largest), num_views);
+}
+
+/// A light ray of each hit goes through the bricks of all ranks. A ray is open if it meets nothing
+/// in any; rank 0 counts those.
+///
+/// placed  the hits of all bricks, at all ranks
+void TeamRenderer::cast_round(const FrameRequest &request, std::uint32_t round,
+                              std::span<const HitRecord> placed, OpenCounts &open,
+                              LaterPasses &stats) {
+  std::vector<std::uint64_t> blocked;
+  together(team_, [&] { blocked = renderer_.blocked_rays(request, round, stats); });
+  const auto [make, take] = in_place(blocked);
+  reduce(blocked.size(), Reduction::kOr, Receiver::kRank0, make, take);
+  const bool is_shadow = round >= light_rays_of(request).num_ambient;
+  ++(is_shadow ? open.num_shadow : open.num_ambient);
+  uchar *const counts = open.counts.data() + (is_shadow ? placed.size() : 0);
+  for (std::size_t ray = 0; ray < placed.size(); ++ray) {
+    const bool is_open = std::isfinite(placed[ray].t) && (blocked[ray / 64] >> ray % 64 & 1) == 0;
+    counts[ray] = static_cast<uchar>(counts[ray] + is_open);
+  }
+}
+
+/// All ranks get the hits that are seen, and each casts their rays through its brick.
 void TeamRenderer::add_ambient(const FrameRequest &request, FrameStats &stats) {
-  std::vector<HitRecord> placed;
+  std::vector<HitRecord> own;
   together(team_, [&] {
     own_hits();
-    placed = renderer_.placed_hits();
+    own = renderer_.placed_hits();
   });
-  const std::vector<HitRecord> hits = compose_hits(placed, kHitFields, Receiver::kAll);
+  const std::vector<HitRecord> placed = compose_hits(own, kHitFields, Receiver::kAll);
   const LightRays light_rays = light_rays_of(request);
-  OpenCounts open{std::vector<uchar>((light_rays.num_shadow != 0 ? 2 : 1) * hits.size())};
+  const std::vector<float> values = has_field_values() ? compose_values() : std::vector<float>();
   together(team_, [&] {
     const std::vector<FrameParams> frames =
         make_level_frames(std::span(whole_levels_).first(num_levels_), request.camera,
                           renderer_.size(), request.isovalue, request.voxel_pixels);
     const auto first = std::ranges::find_if(frames, draws);
     const auto end = std::find_if_not(first, frames.end(), draws);
-    renderer_.begin_ambient(request, hits,
+    renderer_.begin_ambient(request, placed,
                             {static_cast<std::size_t>(first - frames.begin()),
                              static_cast<std::size_t>(end - frames.begin())});
+    if (!values.empty()) renderer_.set_field_values(values);
   });
   has_whole_ = true;
+  OpenCounts open = no_counts(light_rays, placed.size());
   for (std::uint32_t round = 0; round < light_rays.count() && !stats.cancelled; ++round) {
-    std::vector<std::uint64_t> blocked;
-    together(team_, [&] { blocked = renderer_.blocked_rays(round, light_rays, stats.ambient); });
-    const auto [make, take] = in_place(blocked);
-    reduce(blocked.size(), Reduction::kOr, Receiver::kRank0, make, take);
-    const bool is_shadow = round >= light_rays.num_ambient;
-    ++(is_shadow ? open.num_shadow : open.num_ambient);
-    uchar *const counts = open.counts.data() + (is_shadow ? hits.size() : 0);
-    for (std::size_t ray = 0; ray < hits.size(); ++ray) {
-      const bool is_open = std::isfinite(hits[ray].t) && (blocked[ray / 64] >> ray % 64 & 1) == 0;
-      counts[ray] = static_cast<uchar>(counts[ray] + is_open);
-    }
+    cast_round(request, round, placed, open, stats.ambient);
     const bool is_last = round + 1 == light_rays.count();
     if (!is_last && !request.on_pass) continue;
     together(team_, [&] {
@@ -190,6 +213,33 @@ void TeamRenderer::add_ambient(const FrameRequest &request, FrameStats &stats) {
       stats.cancelled = request.on_pass && !request.on_pass(pass) && !is_last;
     });
   }
+}
+
+std::vector<float> TeamRenderer::compose_values() {
+  const std::vector<float> own = renderer_.field_values();
+  const std::span<const HitRecord> hits = own_hits();
+  std::vector<float> values(team_.rank() == 0 ? own.size() : 0, no_value());
+  compose(
+      Receiver::kRank0,
+      [&](std::size_t begin, std::span<std::uint64_t> words) {
+        number_words(hits.subspan(begin, words.size()), std::span(own).subspan(begin), place_,
+                     words);
+      },
+      [&](std::size_t begin, std::span<const std::uint64_t> words) {
+        set_numbers(words, std::span(values).subspan(begin));
+      });
+  return values;
+}
+
+/// In frames of layers, the range of the field.
+std::optional<std::array<float, 2>> TeamRenderer::field_range() {
+  if (!has_field_values()) return renderer_.field_range();
+  std::vector<float> range;
+  if (const auto found = range_of_values(compose_values()))
+    range.assign(found->begin(), found->end());
+  range = of_first(team_, range);
+  if (range.empty()) return {};
+  return {{range[0], range[1]}};
 }
 
 std::span<const HitRecord> TeamRenderer::own_hits() {
@@ -256,9 +306,17 @@ std::vector<HitRecord> TeamRenderer::compose_hits(std::span<const HitRecord> own
 
 FrameArrays TeamRenderer::fetch(const WantedArrays &wanted, const Appearance &appearance) {
   check_arrays(wanted, size());
+  if (wanted.picture) check_field_colors(appearance);
   const bool receives = team_.rank() == 0;
   FrameArrays arrays;
   if (wanted.picture) arrays.picture = compose_picture(appearance);
+  if (wanted.field_values) {
+    const std::vector<float> values = compose_values();
+    if (receives) {
+      arrays.field_values = memory_.array<float>(values.size());
+      std::ranges::copy(values, arrays.field_values.data());
+    }
+  }
   std::vector<HitRecord> hits;
   if (wanted.normals) {
     hits = this->hits();
@@ -277,15 +335,22 @@ HostArray<std::uint8_t> TeamRenderer::compose_picture(const Appearance &appearan
   constexpr WantedArrays kPicture{.picture = true};
   if (has_whole_)
     return receives ? renderer_.fetch(kPicture, appearance).picture : HostArray<std::uint8_t>{};
-  if (renderer_.size().samples > 1) {
-    // The mean of a pixel's colours is made of more than 8 bits of each.
+  const bool has_values = appearance.color_by_field.has_value();
+  if (renderer_.size().samples > 1 || has_values) {
+    // The mean of a pixel's colours is made of more than 8 bits of each, and the colours of a field
+    // may begin and end at values that all bricks' hits have.
     constexpr HitField kShaded[] = {HitField::kT, HitField::kGradX, HitField::kGradY,
                                     HitField::kGradZ};
     const std::vector<HitRecord> hits = compose_hits(own_hits(), kShaded);
+    const std::vector<float> values = has_values ? compose_values() : std::vector<float>();
     if (!receives) return {};
+    const std::vector<float> own_values =
+        has_values ? renderer_.field_values() : std::vector<float>();
     renderer_.set_hits(hits);
+    if (has_values) renderer_.set_field_values(values);
     HostArray<std::uint8_t> picture = renderer_.fetch(kPicture, appearance).picture;
     renderer_.set_hits(own_hits());  // passes may follow
+    if (has_values) renderer_.set_field_values(own_values);
     return picture;
   }
   const HostArray<std::uint32_t> colors = renderer_.shade_packed(appearance);

@@ -20,12 +20,6 @@ struct CompositionStats {
   double ms = 0;                            ///< wall clock, with the wait for slower ranks
 };
 
-/// Numbers of hits of rays, in layers.
-struct HitCounts {
-  std::vector<std::uint16_t> before;  ///< [rays] in bricks before this rank's
-  std::vector<std::uint16_t> all;     ///< [rays] in all bricks
-};
-
 /// Draws the whole volume by the bricks of all ranks.
 class TeamRenderer : public Renderer {
  public:
@@ -51,7 +45,7 @@ class TeamRenderer : public Renderer {
   std::vector<VolumeInfo> levels() const override { return whole_levels_; }
 
   /// Draws this rank's brick. Ambient rays go through the bricks of all ranks. Hits of several
-  /// surfaces are blended on rank 0, in the order of the bricks.
+  /// surfaces and of slices are blended on rank 0.
   ///
   /// request  All ranks have an on_pass, or none. It is called at all ranks after each pass of any
   ///          rank, may ask for the picture so far, and must return the same at all ranks.
@@ -67,9 +61,14 @@ class TeamRenderer : public Renderer {
   }
   Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {},
                 std::uint32_t num_views = 1) override;
+  Camera label_camera(std::span<const std::uint16_t> labels, std::optional<ImageSize> size = {},
+                      std::uint32_t num_views = 1) override;
+  bool has_field_values() const override { return renderer_.has_field_values(); }
+  std::optional<std::array<float, 2>> field_range() override;
 
   ImageSize size() const override { return renderer_.size(); }
-  /// Puts together colours; with several rays a pixel it puts together hits, which rank 0 shades.
+  /// Puts together colours; with several rays a pixel, or colours by a field, it puts together
+  /// hits, which rank 0 shades.
   FrameArrays fetch(const WantedArrays &wanted, const Appearance &appearance) override;
   /// Hits without the ids of their blocks.
   std::vector<HitRecord> hits() override;
@@ -91,9 +90,9 @@ class TeamRenderer : public Renderer {
   void check_levels(const FrameRequest &request) const;
   FrameStats render_in_step(const FrameRequest &request);
   void draw_layers(const FrameRequest &request, FrameStats &stats);
-  HitCounts count_hits(std::span<const std::vector<RayHit>> layers);
-  LayerStats compose_layers(const FrameRequest &request,
-                            std::span<const std::vector<RayHit>> layers);
+  class Layering;
+  void cast_round(const FrameRequest &request, std::uint32_t round,
+                  std::span<const HitRecord> placed, OpenCounts &open, LaterPasses &stats);
   void add_ambient(const FrameRequest &request, FrameStats &stats);
   void reduce(std::size_t count, Reduction how, Receiver who, const MakeWords &make,
               const TakeWords &take);
@@ -108,6 +107,8 @@ class TeamRenderer : public Renderer {
                                       std::span<const HitField> fields,
                                       Receiver who = Receiver::kRank0);
   std::span<const HitRecord> own_hits();
+  /// The field's values at the hits that win, at rank 0.
+  std::vector<float> compose_values();
 
   DeviceRenderer renderer_;
   VolumeInfo brick_;

@@ -49,4 +49,22 @@ struct TeamVolume {
 TeamVolume open_together(Team &team, const TeamVolumeSource &source,
                          const std::function<void(std::vector<VolumeInfo> &levels)> &look_at);
 
+/// The blocks of a field that hits of a brick may have values of.
+///
+/// whole  the volume of the brick
+/// own    the brick's blocks
+/// field  the field's grid
+/// Returns  at least one block of the field, also if the brick is outside
+BlockBox field_blocks(const VolumeInfo &whole, const BlockBox &own, const VolumeInfo &field);
+
+/// Opens a second volume, the field of a team's volume (RendererOptions::field). Each rank keeps
+/// what its brick needs.
+///
+/// source   all but `bricks` and `isovalues`
+/// Returns  this rank's part; its range of values is that of the whole field
+/// Throws   Error at every rank, if one of them fails
+/// Waits    for all ranks
+CompressedVolume open_field_together(Team &team, const TeamVolumeSource &source,
+                                     const TeamVolume &volume);
+
 }  // namespace isowave::core

@@ -42,6 +42,10 @@ LightRays light_rays_of(const FrameRequest &request) {
   return rays;
 }
 
+OpenCounts no_counts(const LightRays &rays, std::size_t num_hits) {
+  return {std::vector<uchar>((rays.num_shadow != 0 ? 2 : 1) * num_hits)};
+}
+
 AmbientParams make_ambient_params(const VolumeInfo &info, std::uint32_t num_ambient) {
   AmbientParams params{};
   params.num_ambient = num_ambient;

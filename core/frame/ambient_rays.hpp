@@ -28,6 +28,8 @@ struct LightRays {
   friend bool operator==(const LightRays &, const LightRays &) = default;
 };
 LightRays light_rays_of(const FrameRequest &request);
+/// Room for the counts of such rays of hits, before the first round.
+OpenCounts no_counts(const LightRays &rays, std::size_t num_hits);
 
 /// info: the finest level of detail that draws the frame.
 AmbientParams make_ambient_params(const VolumeInfo &info, std::uint32_t num_ambient);

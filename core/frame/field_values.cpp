@@ -19,7 +19,10 @@ FieldMap make_field_map(std::span<const VolumeInfo> levels, const VolumeInfo &fi
     for (int column = 0; column < 3; ++column)
       map.rows[4 * row + column] = static_cast<float>(turn[column][row]);
     map.rows[4 * row + 3] = static_cast<float>(begin[row]);
+    map.field_first[row] = static_cast<float>(field.brick.first_voxel[row]);
     map.dims[row] = field.dims[row];
+    for (std::size_t level = 0; level < levels.size(); ++level)
+      map.first[row][level] = static_cast<float>(levels[level].brick.first_voxel[row]);
   }
   map.surfaces = std::numeric_limits<uint>::max();
   set_level_places(levels, map);

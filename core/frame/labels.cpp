@@ -14,8 +14,6 @@ LabelTable label_table(const std::vector<SurfaceStyle> &surfaces) {
 }
 
 void check_labels(const CompressedVolume &volume) {
-  if (volume.info.brick != BrickOf{})
-    throw Error("labels are drawn by one process alone: leave out mpirun and bricks");
   if (!is_integer(volume.info.type))
     throw Error("voxels of type {} are no labels: give a volume of integers",
                 to_string(volume.info.type));

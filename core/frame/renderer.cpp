@@ -129,17 +129,11 @@ void check(const FrameRequest &request, const Abilities &abilities) {
   need(!request.clip.planes.empty(), abilities.clipping,
        "this renderer draws whole volumes alone: leave out clip");
   need(request.field_values, abilities.field,
-       abilities.cells ? "this renderer has no field to colour by: make it with one"
-                       : "a team draws without colours by a field: leave them out");
+       "this renderer has no field to colour by: make it with one");
   need(
       request.field_values && request.field_labels, abilities.field_labels,
       "the field's voxels are no labels, exact whole numbers from 0 to 65535: leave out colours by "
       "label");
-  need(!request.surfaces.empty() && light_rays_of(request).count() != 0, abilities.cells,
-       "a team draws several or translucent surfaces without ambient and shadow rays: leave them "
-       "out");
-  need(!request.slices.planes.empty(), abilities.cells,
-       "a team draws without slices: leave them out");
   need(!request.surfaces.empty() && request.on_pass && !abilities.cells, false,
        "a team draws several or translucent surfaces at once: leave out on_pass");
   need(!request.slices.planes.empty(), abilities.most_surfaces != 0,
@@ -179,10 +173,14 @@ Image8 Renderer::shade(const Appearance &appearance) {
   return arrays.picture.empty() ? Image8{} : image_of(size(), arrays.picture);
 }
 
-Shading Renderer::shading_of(const VolumeInfo &info, const Appearance &appearance) {
-  const auto &by = appearance.color_by_field;
-  if (by && !has_field_values())
+void Renderer::check_field_colors(const Appearance &appearance) const {
+  if (appearance.color_by_field && !has_field_values())
     throw Error("the last frame has no values of a field: ask for field_values");
+}
+
+Shading Renderer::shading_of(const VolumeInfo &info, const Appearance &appearance) {
+  check_field_colors(appearance);
+  const auto &by = appearance.color_by_field;
   const bool needs_range = by && !by->labels && !(by->low && by->high);
   return make_shading(info, appearance, needs_range ? field_range() : std::nullopt);
 }

@@ -153,9 +153,11 @@ class Renderer {
 
  protected:
   Renderer() = default;
+  /// Throws  Error: colours by a field whose values the last frame does not have
+  void check_field_colors(const Appearance &appearance) const;
   /// make_shading(), with field_range() if the appearance gives no range.
   ///
-  /// Throws  Error: also colours by a field whose values the last frame does not have
+  /// Throws  Error: also as check_field_colors()
   Shading shading_of(const VolumeInfo &info, const Appearance &appearance);
 
  private:

@@ -71,6 +71,18 @@ std::vector<std::uint32_t> innermost_first(const std::vector<SurfaceStyle> &surf
   return numbers;
 }
 
+std::vector<float> isovalues_of_layers(const std::vector<SurfaceStyle> &surfaces) {
+  std::vector<float> isovalues;
+  isovalues.reserve(surfaces.size());
+  for (const std::uint32_t surface : innermost_first(surfaces))
+    isovalues.push_back(surfaces[surface].isovalue_of_field());
+  return isovalues;
+}
+
+bool any_is_whole(const std::vector<SurfaceStyle> &surfaces) {
+  return !std::ranges::all_of(surfaces, &SurfaceStyle::clipped);
+}
+
 uint mapped_surfaces(const std::vector<SurfaceStyle> &surfaces) {
   uint mapped = surfaces.empty() ? 1 : 0;
   for (std::size_t i = 0; i < surfaces.size(); ++i) mapped |= surfaces[i].mapped ? 1u << i : 0;

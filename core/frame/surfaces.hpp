@@ -64,6 +64,11 @@ void check_some_are_opaque(const Surfaces &surfaces) {
 /// The numbers of surfaces, those of larger isovalues first: the order in which layers prefer hits
 /// at one place. Surfaces of labels keep the order in which they are given.
 std::vector<std::uint32_t> innermost_first(const std::vector<SurfaceStyle> &surfaces);
+/// SurfaceStyle::isovalue_of_field() of the surfaces, in that order.
+std::vector<float> isovalues_of_layers(const std::vector<SurfaceStyle> &surfaces);
+
+/// Whether clipping planes leave one of them whole.
+bool any_is_whole(const std::vector<SurfaceStyle> &surfaces);
 
 /// FieldMap::surfaces of a frame's surfaces; of none: of the one opaque surface.
 uint mapped_surfaces(const std::vector<SurfaceStyle> &surfaces);

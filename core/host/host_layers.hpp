@@ -170,13 +170,15 @@ inline HitLight light_of_hit(std::span<const HostLevel> surfaces, const LayerBle
     const GivenRay given = ambient_ray(&seen, &rays.params, placed, ray_id, k,
                                        rays.directions[k * ISO_AMBIENT_PATTERNS + pattern]);
     if (!is_given(given)) continue;
-    const Ray ray = make_given_ray(given);
     num_open[is_shadow_ray(&rays.params, k)] += std::ranges::none_of(by.opaque, [&](auto place) {
       const HostLevel &surface = surfaces[place];
+      const GivenRay ray = surface.clip != nullptr && by.any_is_whole
+                               ? entering(surface.clip, given, rays.voxel)
+                               : given;
       return kTraceRay(surface.frame, surface.field, active_box(surface.frame.surface, last), last,
-                       ray, &met) &&
+                       make_given_ray(ray), &met) &&
              (surface.clip == nullptr ||
-              !is_clipped(surface.clip, given, rays.voxel, met.t / seen.view.t_scale));
+              !is_clipped(surface.clip, ray, rays.voxel, met.t / seen.view.t_scale));
     });
   }
   const uchar counts[2] = {static_cast<uchar>(num_open[0]), static_cast<uchar>(num_open[1])};

@@ -135,6 +135,7 @@ struct LayerBlend {
   const HostFieldValues *field = nullptr;  ///< for colours of the surfaces; null: none
   AmbientRays rays{};                      ///< of the hits of each layer
   std::vector<std::size_t> opaque{};       ///< the surfaces that such rays may meet
+  bool any_is_whole = false;               ///< of all surfaces
 };
 
 struct HostLoops {

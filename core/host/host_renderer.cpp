@@ -209,6 +209,7 @@ void HostRenderer::draw_surfaces(const FrameRequest &request, const FrameParams 
              &frame,
              0,
              1};
+  by.any_is_whole = any_is_whole(request.surfaces);
   for (std::size_t k = 0; k < by.numbers.size(); ++k) {
     if (request.surfaces[by.numbers[k]].opacity == 1) by.opaque.push_back(k);
   }

@@ -1,11 +1,9 @@
 // What a brick's renderer does for the light rays of whole frames (core/bricks).
 
-#include <cmath>
 #include <limits>
 
 #include "core/base/error.hpp"
 #include "core/render/device_renderer.hpp"
-#include "kernels_cl/portable/clip.h"
 
 namespace isowave::core {
 
@@ -26,6 +24,10 @@ std::vector<HitRecord> DeviceRenderer::placed_hits() {
   return hits;
 }
 
+HitRecord DeviceRenderer::placed(const HitRecord &hit) const {
+  return placed_hit(&blocks_.level_frames->front(), 0, hit);
+}
+
 void DeviceRenderer::begin_ambient(const FrameRequest &request, std::vector<HitRecord> placed,
                                    LevelRange levels) {
   check_has_picture();
@@ -34,8 +36,9 @@ void DeviceRenderer::begin_ambient(const FrameRequest &request, std::vector<HitR
   for (HitRecord &hit : placed) hit.cell -= static_cast<uint>(levels.first);
   set_hits(placed);
   // A ray stays in the level that has its hit, which this brick need not have drawn.
+  const FirstSurface first = first_surface(request);
   std::vector<FrameParams> frames =
-      make_level_frames(DeviceRenderer::levels(), request.camera, size_, request.isovalue, 0);
+      make_level_frames(DeviceRenderer::levels(), request.camera, size_, first.isovalue, 0);
   for (std::size_t level = 0; level < frames.size(); ++level) {
     const bool may_have_rays = level >= levels.first && level < levels.end;
     const View &view = frames[level].view;
@@ -43,36 +46,33 @@ void DeviceRenderer::begin_ambient(const FrameRequest &request, std::vector<HitR
     frames[level].band = {.begin_t = 0,
                           .end_t = may_have_rays ? std::numeric_limits<float>::infinity() : 0};
   }
+  frames.front().surface.isovalue_index = first.number;
+  layers_screen_ = frames.front().screen;
   open_frame(std::move(frames), decoded_values(request), FieldBound::kNone, RaySource::kGiven);
 }
 
-std::vector<std::uint64_t> DeviceRenderer::blocked_rays(std::uint32_t round,
-                                                        const LightRays &light_rays,
-                                                        LaterPasses &stats) {
+std::vector<std::uint64_t> DeviceRenderer::blocked_rays(const FrameRequest &request,
+                                                        std::uint32_t round, LaterPasses &stats) {
   rays_.frame = blocks_.level_frames->front();
-  ambient_->begin(blocks_.levels[blocks_.drawing.first].info, blocks_.drawing.first, light_rays);
+  const VolumeInfo &info = blocks_.levels[blocks_.drawing.first].info;
+  ambient_->begin(info, blocks_.drawing.first, light_rays_of(request));
   const OnPass never_stops;
   Frame frame{never_stops, 1};
-  cast_round(round, frame);
+  if (request.surfaces.empty()) {
+    cast_round(round, frame);
+    ambient_->block(rays_);
+  } else {
+    const ClipParams clip =
+        make_clip_params(blocks_.levels[0].info, rays_.frame.view, request.camera, request.clip);
+    cast_layer_round(round, request, clip, isovalues_of_layers(request.surfaces), frame);
+  }
   const LaterPasses &passes = frame.stats.ambient;
   rays_.frame = blocks_.levels[0].frame;  // for shading
-  std::vector<HitRecord> met(size_.num_rays());
-  rays_.given_hits.read(met);
-  const bool is_shadow = round >= light_rays.num_ambient;
-  std::vector<GivenRay> given(rays_.is_clipped() || is_shadow ? met.size() : 0);
-  if (!given.empty()) rays_.given.read(given);
-  std::vector<std::uint64_t> blocked((met.size() + 63) / 64);
-  for (std::size_t ray = 0; ray < met.size(); ++ray) {
-    bool meets = met[ray].t != std::numeric_limits<float>::infinity();
-    if (meets && rays_.is_clipped()) {
-      const float in_first = std::ldexp(1.0f, static_cast<int>(given[ray].level)),
-                  voxel = std::ldexp(in_first, static_cast<int>(blocks_.drawing.first));
-      const float t_scale = blocks_.level_frames->front().view.t_scale * in_first;
-      meets = !is_clipped(&rays_.clip_params(), given[ray], voxel, met[ray].t / t_scale);
-    }
-    if (is_shadow) meets |= !is_given(given[ray]);
-    blocked[ray / 64] |= std::uint64_t{meets} << ray % 64;
-  }
+  std::vector<GivenRay> left(size_.num_rays());
+  rays_.given.read(left);
+  std::vector<std::uint64_t> blocked((left.size() + 63) / 64);
+  for (std::size_t ray = 0; ray < left.size(); ++ray)
+    blocked[ray / 64] |= std::uint64_t{!is_given(left[ray])} << ray % 64;
   blocks_.close(passes.recycled_blocks, true);
   stats += passes;
   return blocked;
@@ -84,6 +84,11 @@ void DeviceRenderer::set_open(const OpenCounts &open) {
   rays_.open_counts.write(open.counts);
   rays_.num_ambient = open.num_ambient;
   rays_.num_shadow = open.num_shadow;
+}
+
+void DeviceRenderer::set_field_values(std::span<const float> values) {
+  check_has_picture();
+  rays_.field_values.write(values);
 }
 
 }  // namespace isowave::core

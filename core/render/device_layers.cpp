@@ -28,11 +28,7 @@ bool any_goes_on(const LayerCounts &counts) {
 /// Layer by layer: each ray's nearest hit of all surfaces gets its gradient and is blended. Rays
 /// that go on find the next hit of that surface.
 void DeviceRenderer::draw_layers(const FrameRequest &request, Frame &frame) {
-  const std::vector<std::uint32_t> order = innermost_first(request.surfaces);
-  std::vector<float> isovalues;
-  isovalues.reserve(order.size());
-  for (const std::uint32_t surface : order)
-    isovalues.push_back(request.surfaces[surface].isovalue_of_field());
+  std::vector<float> isovalues = isovalues_of_layers(request.surfaces);
   FrameStats &stats = frame.stats;
   frame.waves_left = std::numeric_limits<std::uint32_t>::max();  // as many as it takes
   last_view_.reset();
@@ -107,23 +103,34 @@ std::size_t DeviceRenderer::find_first_hits(const FrameRequest &request, const C
   return num_surfaces;
 }
 
-/// Casts ambient and shadow rays from the hits of a layer, in rays_.hits. They may meet opaque
-/// surfaces.
+/// Casts ambient and shadow rays from the hits of a layer, in rays_.hits.
 void DeviceRenderer::light_layer(const FrameRequest &request, const ClipParams &clip,
                                  std::span<const float> isovalues, Frame &frame) {
   const std::uint32_t num_rounds = light_rays_of(request).count();
-  for (std::uint32_t round = 0; round < num_rounds; ++round) {
-    bool goes_on = false;
+  for (std::uint32_t round = 0; round < num_rounds; ++round)
+    cast_layer_round(round, request, clip, isovalues, frame);
+  if (!frame.stats.cancelled) count_last_round(num_rounds, frame);
+}
+
+/// Casts one light ray of each hit of a layer, which may meet any opaque surface: first those that
+/// clipping planes leave whole.
+void DeviceRenderer::cast_layer_round(std::uint32_t round, const FrameRequest &request,
+                                      const ClipParams &clip, std::span<const float> isovalues,
+                                      Frame &frame) {
+  const bool may_begin_outside = clip.num_planes != 0 && any_is_whole(request.surfaces);
+  bool goes_on = false;
+  for (const bool clipped : {false, true}) {
+    bool enters = clipped && may_begin_outside;
     for (std::size_t place = 0; place < isovalues.size() && !frame.stats.cancelled; ++place) {
-      if (request.surfaces[layers_->surface_at(place)].opacity < 1) continue;
+      const SurfaceStyle &surface = request.surfaces[layers_->surface_at(place)];
+      if (surface.opacity < 1 || surface.clipped != clipped) continue;
       show_surface(request, clip, place, isovalues[place]);
       rays_.frame.screen = layers_screen_;  // of all hits
-      ambient_round_->set_round(round, std::exchange(goes_on, true));
+      ambient_round_->set_round(round, std::exchange(goes_on, true), std::exchange(enters, false));
       run(*ambient_round_, frame);
       ambient_->block(rays_);
     }
   }
-  if (!frame.stats.cancelled) count_last_round(num_rounds, frame);
 }
 
 /// Behind the last layer that is drawn, hits are counted alone.
@@ -155,9 +162,11 @@ LayerCounts DeviceRenderer::draw_layer(std::uint32_t layer, const FrameRequest &
   if (is_further && frame.stats.cancelled) rays_.field_values.fill(no_value());
   if (is_lit) light_layer(request, clip, isovalues, frame);
   if (previews) layers_->clear(rays_);
+  if (layer_hits_ != nullptr)
+    layer_hits_->push_back(layers_->read(
+        rays_, !is_further, is_drawn && (has_field || !request.slices.planes.empty())));
   const LayerCounts counts =
       layers_->blend(rays_, !is_further, is_drawn ? ISO_BLENDS : ISO_COUNTS_ALONE);
-  if (layer_hits_ != nullptr) layer_hits_->push_back(layers_->read(rays_, !is_further));
   layers_->next_layer();
   is_in_further_layer_ = false;
   if (is_further) layers_->swap_layer(rays_);

@@ -266,7 +266,8 @@ void DeviceRenderer::compile_kernels() {
     }
     if (field_) waves.push_back(&*field_);
     if (ambient_round_) waves.push_back(&*ambient_round_);
-    if (ambient_ && behind_ && num_levels == 1) ambient_->block(rays);
+    if (ambient_ && (behind_ || is_brick())) ambient_->block(rays);
+    if (ambient_ && behind_) ambient_->enter(rays);
     if (bounce_) {
       bounce_->go_to_light(rays, 0);
       bounce_->add(rays, 0);
@@ -321,22 +322,23 @@ std::vector<VolumeInfo> DeviceRenderer::levels() const {
   return infos_of(blocks_.levels);
 }
 
+DeviceRenderer::FirstSurface DeviceRenderer::first_surface(const FrameRequest &request) {
+  if (request.surfaces.empty()) return {request.isovalue, 0, true};
+  const std::uint32_t number = innermost_first(request.surfaces).front();
+  const SurfaceStyle &surface = request.surfaces[number];
+  return {surface.isovalue_of_field(), number, surface.clipped};
+}
+
 void DeviceRenderer::begin_frame(const FrameRequest &request) {
   core::check(request, abilities());
   if (light_rays_of(request).count() != 0 && is_brick())
     throw Error("a brick's ambient and shadow rays go on in other bricks: see TeamRenderer");
   const ImageSize size = size_of(request, abilities());
-  const std::uint32_t number =
-      request.surfaces.empty() ? 0 : innermost_first(request.surfaces).front();
-  const SurfaceStyle first = request.surfaces.empty() ? SurfaceStyle{.isovalue = request.isovalue}
-                                                      : request.surfaces[number];
-  std::vector<FrameParams> frames =
-      make_level_frames(infos_of(blocks_.levels), request.camera, size, first.isovalue_of_field(),
-                        request.voxel_pixels);
-  if (options_.with_labels) {
-    choose_labels(request.surfaces);
-    frames.front().surface.isovalue_index = number;
-  }
+  const FirstSurface first = first_surface(request);
+  std::vector<FrameParams> frames = make_level_frames(infos_of(blocks_.levels), request.camera,
+                                                      size, first.isovalue, request.voxel_pixels);
+  if (options_.with_labels) choose_labels(request.surfaces);
+  frames.front().surface.isovalue_index = first.number;
   const std::vector<DecodedValues> values = decoded_values(request);
   has_picture_ = false;
   has_layers_ = is_in_further_layer_ = false;
@@ -416,16 +418,18 @@ Camera DeviceRenderer::camera(std::span<const float> isovalues, std::optional<Im
                         size.value_or(options_.size), num_views);
 }
 
-Camera DeviceRenderer::label_camera(std::span<const std::uint16_t> labels,
-                                    std::optional<ImageSize> size, std::uint32_t num_views) {
-  if (!options_.with_labels) return Renderer::label_camera(labels, size, num_views);
+std::optional<BlockBox> DeviceRenderer::label_box(std::span<const std::uint16_t> labels) {
   choose_labels({{.labels = {labels.begin(), labels.end()}}});
   Level &finest = blocks_.levels[0];
   finest.macrocells.use(0);  // the group's
-  return surface_camera(
-      finest.info,
-      isowave::core::surface_box(finest.macrocells, finest.info, std::array{ISO_LABEL_ISOVALUE}),
-      size.value_or(options_.size), num_views);
+  return isowave::core::surface_box(finest.macrocells, finest.info, std::array{ISO_LABEL_ISOVALUE});
+}
+
+Camera DeviceRenderer::label_camera(std::span<const std::uint16_t> labels,
+                                    std::optional<ImageSize> size, std::uint32_t num_views) {
+  if (!options_.with_labels) return Renderer::label_camera(labels, size, num_views);
+  return surface_camera(blocks_.levels[0].info, label_box(labels), size.value_or(options_.size),
+                        num_views);
 }
 
 std::vector<HitRecord> DeviceRenderer::cast_rays(std::span<const WorldRay> world_rays,

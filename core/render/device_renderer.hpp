@@ -64,6 +64,9 @@ class DeviceRenderer : public Renderer {
   /// Waits   yes
   std::optional<BlockBox> surface_box(std::span<const float> isovalues);
 
+  /// The same of the surface of labels, of a renderer with Abilities::labels.
+  std::optional<BlockBox> label_box(std::span<const std::uint16_t> labels);
+
   Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {},
                 std::uint32_t num_views = 1) override;
   Camera label_camera(std::span<const std::uint16_t> labels, std::optional<ImageSize> size = {},
@@ -108,9 +111,16 @@ class DeviceRenderer : public Renderer {
   void set_colors(std::span<const RayColor> colors);
   /// hits() as all bricks can read them, of any level of detail: see placed_hit().
   std::vector<HitRecord> placed_hits();
-  /// Begins the rounds of ambient rays of the last frame, which was not cancelled. Rays start at
-  /// the placed hits of all bricks, which replace the brick's own.
+  /// The same of a hit of a frame of layers.
+  HitRecord placed(const HitRecord &hit) const;
+  /// What pictures with colours by a field need, at hits that set_hits() has replaced: their values
+  /// [height * width]. Waits.
+  void set_field_values(std::span<const float> values);
+  /// Begins the rounds of light rays of the last frame, which was not cancelled; in frames of
+  /// layers, those of a layer. Rays start at the placed hits of all bricks, which replace the
+  /// brick's own.
   ///
+  /// placed   no_hit() where no rays begin
   /// levels   levels of detail that draw the frame of the whole volume
   /// Throws   Error: no frame was drawn; the renderer is not a brick's, or was made without given
   ///          rays
@@ -118,11 +128,11 @@ class DeviceRenderer : public Renderer {
   void begin_ambient(const FrameRequest &request, std::vector<HitRecord> placed, LevelRange levels);
   /// Casts a round of ambient or shadow rays through this brick.
   ///
-  /// round    0..light_rays.count() - 1
-  /// Returns  bits [(rays + 63) / 64]: 1 if the ray meets a surface in this brick, or is a shadow
-  ///          ray of a hit that faces away from the light
+  /// request  as for begin_ambient()
+  /// round    0..light_rays_of(request).count() - 1
+  /// Returns  bits [(rays + 63) / 64]: 1 if the ray meets a surface in this brick, or there is none
   /// Waits    yes
-  std::vector<std::uint64_t> blocked_rays(std::uint32_t round, const LightRays &light_rays,
+  std::vector<std::uint64_t> blocked_rays(const FrameRequest &request, std::uint32_t round,
                                           LaterPasses &stats);
   /// Sets the counts that pictures have instead of open(). Waits.
   void set_open(const OpenCounts &open);
@@ -150,6 +160,14 @@ class DeviceRenderer : public Renderer {
     std::uint32_t waves_left;  ///< waves that follow the one at work
     FrameStats stats{};
   };
+
+  /// The surface whose hits a frame finds first: the only one, or the innermost.
+  struct FirstSurface {
+    float isovalue;
+    uint number;
+    bool clipped;
+  };
+  static FirstSurface first_surface(const FrameRequest &request);
 
   /// Makes rays_.hits the picture so far, while waves of layers have other hits there.
   class PictureSoFar;
@@ -181,6 +199,8 @@ class DeviceRenderer : public Renderer {
                               std::span<const float> isovalues, Frame &frame);
   void light_layer(const FrameRequest &request, const ClipParams &clip,
                    std::span<const float> isovalues, Frame &frame);
+  void cast_layer_round(std::uint32_t round, const FrameRequest &request, const ClipParams &clip,
+                        std::span<const float> isovalues, Frame &frame);
   LayerCounts draw_layer(std::uint32_t layer, const FrameRequest &request, const ClipParams &clip,
                          std::span<const float> isovalues, Frame &frame);
   void find_hits_behind(const FrameRequest &request, const ClipParams &clip,

@@ -138,6 +138,10 @@ void AmbientRound::begin() {
     const auto stage = blocks_.device.timer().stage("ambient");
     ambient_(rays_, round_);
   }
+  if (enters_) {
+    const auto stage = blocks_.device.timer().stage("ambient");
+    ambient_.enter(rays_);
+  }
   given_.go_on();
 }
 

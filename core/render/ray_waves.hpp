@@ -156,9 +156,11 @@ class AmbientRound : public Wave {
       : blocks_(blocks), rays_(rays), ambient_(ambient), given_(given) {}
 
   /// goes_on  the rays of the round have been made already, for another surface
-  void set_round(std::uint32_t round, bool goes_on = false) {
+  /// enters   Ambient::enter() follows
+  void set_round(std::uint32_t round, bool goes_on = false, bool enters = false) {
     round_ = round;
     goes_on_ = goes_on;
+    enters_ = enters;
   }
   void begin() override;
   void enqueue_pass() override { given_.enqueue_pass(); }
@@ -170,7 +172,7 @@ class AmbientRound : public Wave {
   Ambient &ambient_;
   RaysWave &given_;
   std::uint32_t round_ = 0;
-  bool goes_on_ = false;
+  bool goes_on_ = false, enters_ = false;
 };
 
 }  // namespace isowave::core

@@ -65,8 +65,6 @@ RendererOptions checked(RendererOptions options, const CompressedVolume &volume,
   }
   if (options.field != nullptr) {
     check_volume_info(options.field->info, "the field");
-    if (volume.info.brick != BrickOf{} || options.field->info.brick != BrickOf{})
-      throw Error("bricks are drawn without colours by a field: leave out the field");
     if (!options.pipeline->has_clipping())
       throw Error("colours by a field are drawn by pipeline rays: leave out the field");
     if (options.field->block_count() >= ISO_MAX_BLOCK_IDS)

@@ -23,7 +23,8 @@ Ambient::Ambient(ocl::Device &device, std::uint64_t num_pixels, bool levels, boo
     : range_(ocl::Range::strided(num_pixels, ocl::kGroupSize, device)),
       directions_(device, sizes()["ambient directions"]),
       kernel_(device, defines_of(placed), levels),
-      block_(device, defines_of(placed)) {}
+      block_(device, defines_of(placed)),
+      enter_(device, defines_of(placed)) {}
 
 void Ambient::begin(const VolumeInfo &info, std::size_t level, const LightRays &light_rays,
                     std::uint32_t num_surfaces) {
@@ -45,6 +46,10 @@ void Ambient::operator()(Wavefront &rays, std::uint32_t round) {
 
 void Ambient::block(Wavefront &rays) {
   block_(range_, rays.frame, rays.clip, level_, rays.given, rays.given_hits);
+}
+
+void Ambient::enter(Wavefront &rays) {
+  enter_(range_, rays.frame, rays.clip, level_, rays.given);
 }
 
 }  // namespace isowave::core

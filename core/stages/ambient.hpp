@@ -37,6 +37,12 @@ class Ambient {
   /// In, Out  rays.given, rays.given_hits
   /// Waits    no
   void block(Wavefront &rays);
+  /// Moves the rays of the round to where they enter rays.clip, before they go to the first surface
+  /// that it clips.
+  ///
+  /// In, Out  rays.given
+  /// Waits    no
+  void enter(Wavefront &rays);
 
  private:
   ocl::Range range_;
@@ -46,6 +52,7 @@ class Ambient {
   uint level_ = 0, num_surfaces_ = 1;
   LevelledKernel<kernels::ambient> kernel_;
   ocl::Kernel<kernels::ambient_block> block_;
+  ocl::Kernel<kernels::ambient_enter> enter_;
 };
 
 }  // namespace isowave::core

@@ -95,10 +95,12 @@ LayerCounts Layers::blend(Wavefront &rays, bool is_first, uint how) {
   return next_counts_.read().front();
 }
 
-std::vector<RayHit> Layers::read(const Wavefront &rays, bool is_first) const {
+std::vector<RayHit> Layers::read(const Wavefront &rays, bool is_first, bool with_values) const {
   const std::uint32_t num_rays = rays.frame.view.width * rays.frame.view.height;
   std::vector<HitRecord> hits(num_rays);
   rays.hits.read(hits);
+  std::vector<float> values(with_values ? num_rays : 0);
+  if (with_values) rays.field_values.read(values);
   std::vector<uint> listed(is_first ? num_rays : counts_.read().front().rays);
   if (is_first) {
     std::iota(listed.begin(), listed.end(), 0u);
@@ -108,7 +110,8 @@ std::vector<RayHit> Layers::read(const Wavefront &rays, bool is_first) const {
   std::vector<RayHit> result;
   result.reserve(listed.size());
   for (const uint ray : listed) {
-    if (std::isfinite(hits[ray].t)) result.push_back({ray, hits[ray]});
+    if (std::isfinite(hits[ray].t))
+      result.push_back({ray, hits[ray], with_values ? values[ray] : 0.0f});
   }
   return result;
 }

@@ -16,6 +16,7 @@ namespace isowave::core {
 struct RayHit {
   std::uint32_t ray = 0;
   HitRecord hit{};
+  float value = 0;  ///< of the voxels on a slice, else of the field; see has_value_color()
 };
 
 class Layers {
@@ -64,11 +65,12 @@ class Layers {
   ///        the hits
   /// Waits  yes
   LayerCounts blend(Wavefront &rays, bool is_first, uint how = ISO_BLENDS);
-  /// The hits of rays.hits, after blend() and before next_layer().
+  /// The hits of rays.hits, before blend().
   ///
-  /// is_first  as for blend()
-  /// Waits     yes
-  std::vector<RayHit> read(const Wavefront &rays, bool is_first) const;
+  /// is_first     as for blend()
+  /// with_values  reads rays.field_values, too
+  /// Waits        yes
+  std::vector<RayHit> read(const Wavefront &rays, bool is_first, bool with_values) const;
   /// Takes the rays that blend() has listed.
   void next_layer() {
     std::swap(listed_, next_listed_);

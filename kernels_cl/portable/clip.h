@@ -73,17 +73,37 @@ ISO_INLINE int is_cap(HitRecord hit) {
   return ISO_CLIP && hit.t != INFINITY && (hit.cell & ISO_CAP) != 0;
 }
 
-/// Has a ray that begins in front of all planes left their half spaces at t?
+/// A light ray from where it enters the half spaces of all planes: those of the surfaces that are
+/// clipped, which the surface with its hit need not be. A ray that begins there stays as it is. A
+/// ray that never enters begins where is_clipped() finds that it has left.
 ///
 /// given  in the index space of a level of detail
 /// voxel  its voxels' size [voxels of the finest level]
+ISO_INLINE GivenRay entering(ISO_GLOBAL const ClipParams *clip, GivenRay given, float voxel) {
+  float begin = 0.0f;
+  for (uint i = 0; i < clip->num_planes; ++i) {
+    ISO_GLOBAL const PlaneParams *p = &clip->planes[i];
+    const float d = fma(p->grad_x, given.d_x, fma(p->grad_y, given.d_y, p->grad_z * given.d_z)),
+                o = fma(p->grad_x, given.o_x, fma(p->grad_y, given.o_y, p->grad_z * given.o_z));
+    const float t = d > 0.0f ? -(o + p->first_voxel / voxel) / d : 0.0f;
+    begin = t > begin ? t : begin;
+  }
+  given.o_x = fma(begin, given.d_x, given.o_x);
+  given.o_y = fma(begin, given.d_y, given.o_y);
+  given.o_z = fma(begin, given.d_z, given.o_z);
+  return given;
+}
+
+/// Has a ray that begins in front of all planes, or is entering(), left their half spaces at t?
+///
+/// given, voxel  as of entering()
 ISO_INLINE int is_clipped(ISO_GLOBAL const ClipParams *clip, GivenRay given, float voxel, float t) {
   int behind = 0;
   for (uint i = 0; i < clip->num_planes; ++i) {
     ISO_GLOBAL const PlaneParams *p = &clip->planes[i];
     const float d = fma(p->grad_x, given.d_x, fma(p->grad_y, given.d_y, p->grad_z * given.d_z)),
                 o = fma(p->grad_x, given.o_x, fma(p->grad_y, given.o_y, p->grad_z * given.o_z));
-    behind |= d < 0.0f && fma(voxel, fma(t, d, o), p->first_voxel) < 0.0f;
+    behind |= !(d > 0.0f) && fma(voxel, fma(t, d, o), p->first_voxel) < 0.0f;
   }
   return behind;
 }

@@ -24,18 +24,20 @@ ISO_NAMESPACE_BEGIN
 
 /// From a hit's cell to the index space of the field.
 typedef struct FieldMap {
-  float rows[12];                  ///< row-major 3 x 4, from the finest level's index space
-  uint dims[3];                    ///< of the field [voxels]
-  uint blocks_x, blocks_y;         ///< blocks of the finest level
-  uint num_levels;                 ///< levels that may have hits
-  uint caps_alone;                 ///< 0 or 1: hits that are no caps have no value
+  float rows[12];                    ///< row-major 3 x 4, from the finest level's index space
+  float field_first[3];              ///< first voxel of the field's brick; 0 if it is not cut
+  uint dims[3];                      ///< of the field, or its brick [voxels]
+  float first[3][ISO_FIELD_LEVELS];  ///< the same of each level of the volume that is drawn
+  uint blocks_x, blocks_y;           ///< blocks of the finest level
+  uint num_levels;                   ///< levels that may have hits
+  uint caps_alone;                   ///< 0 or 1: hits that are no caps have no value
   uint surfaces;                   ///< bit i: hits of the surface or slice of number i have values
   uint labels;                     ///< ISO_FIELD_*: what the field's values are
   uint begin_z[ISO_FIELD_LEVELS];  ///< see LevelPlace
 } FieldMap;
-ISO_CHECK_SIZE(FieldMap, 148);
+ISO_CHECK_SIZE(FieldMap, 352);
 
-/// The place of a hit in the field.
+/// The place of a hit in the field, or in its brick.
 typedef struct FieldPlace {
   int x, y, z;   ///< cell; -1: outside
   CellPoint at;  ///< in the cell
@@ -68,16 +70,21 @@ ISO_INLINE float value_of_key(uint key) {
 #endif
 }
 
-/// The cell along an axis, or -1. at: Out, the place in the cell, [0,1]
-ISO_INLINE int field_cell(float p, uint dims, float *at) {
-  const float last = (float)(dims - 1u);
+/// The cell of a grid, or of a brick of it, along an axis; -1: outside.
+///
+/// p      in the whole grid's index space [voxels]
+/// first  of the brick's voxels; 0: the grid is not cut
+/// dims   of the brick [voxels]
+/// at     Out, the place in the cell, [0,1]
+ISO_INLINE int field_cell(float p, float first, uint dims, float *at) {
+  const float last = first + (float)(dims - 1u);
   int cell;
-  if (!(p >= -ISO_FIELD_REACH && p <= last + ISO_FIELD_REACH)) return -1;
-  p = p > 0.0f ? (p < last ? p : last) : 0.0f;
+  if (!(p >= first - ISO_FIELD_REACH && p <= last + ISO_FIELD_REACH)) return -1;
+  p = p > first ? (p < last ? p : last) : first;
   cell = (int)p;
-  if (cell > (int)dims - 2) cell = (int)dims - 2;
+  if (cell > (int)last - 1) cell = (int)last - 1;
   *at = p - (float)cell;
-  return cell;
+  return cell - (int)first;
 }
 
 /// Is it a hit of one of the map's surfaces?
@@ -95,16 +102,18 @@ ISO_INLINE FieldPlace field_place(ISO_GLOBAL const FieldMap *m, HitRecord hit) {
   while (level + 1 < m->num_levels && m->begin_z[level + 1] <= layer) ++level;
   /* Voxel k of a level lies where voxel 2k of the finer one does. */
   scale = (float)(1u << level);
-  x = scale * ((float)(4 * (hit.block_id % m->blocks_x) + (hit.cell & 3u)) + hit.x);
-  y = scale *
-      ((float)(4 * (hit.block_id / m->blocks_x % m->blocks_y) + (hit.cell >> 2 & 3u)) + hit.y);
-  z = scale * ((float)(4 * (layer - m->begin_z[level]) + (hit.cell >> 4 & 3u)) + hit.z);
+  x = scale *
+      ((float)(4 * (hit.block_id % m->blocks_x) + (hit.cell & 3u)) + m->first[0][level] + hit.x);
+  y = scale * ((float)(4 * (hit.block_id / m->blocks_x % m->blocks_y) + (hit.cell >> 2 & 3u)) +
+               m->first[1][level] + hit.y);
+  z = scale * ((float)(4 * (layer - m->begin_z[level]) + (hit.cell >> 4 & 3u)) +
+               m->first[2][level] + hit.z);
   place.x = field_cell(fma(m->rows[0], x, fma(m->rows[1], y, fma(m->rows[2], z, m->rows[3]))),
-                       m->dims[0], &place.at.x);
+                       m->field_first[0], m->dims[0], &place.at.x);
   place.y = field_cell(fma(m->rows[4], x, fma(m->rows[5], y, fma(m->rows[6], z, m->rows[7]))),
-                       m->dims[1], &place.at.y);
+                       m->field_first[1], m->dims[1], &place.at.y);
   place.z = field_cell(fma(m->rows[8], x, fma(m->rows[9], y, fma(m->rows[10], z, m->rows[11]))),
-                       m->dims[2], &place.at.z);
+                       m->field_first[2], m->dims[2], &place.at.z);
   return place;
 }
 

@@ -96,7 +96,7 @@ ISO_INLINE int is_of_slice(ISO_GLOBAL const LayerParams *layers, HitRecord hit) 
 }
 
 /// Where a ray of the camera meets a slice: the plane's gradient, in a cell of the grid. No hit
-/// outside the grid, or in what is clipped.
+/// outside the grid, in a block of another brick, or in what is clipped.
 ISO_INLINE HitRecord slice_hit(const FrameParams *frame, ISO_GLOBAL const ClipParams *clip,
                                ISO_GLOBAL const LayerParams *layers, uint slice, uint ray_id) {
   const RayOfView view = ray_of_view(&frame->view, ray_id);
@@ -105,18 +105,23 @@ ISO_INLINE HitRecord slice_hit(const FrameParams *frame, ISO_GLOBAL const ClipPa
       make_plane_axis(&frame->view, &layers->slices, plane, view.u, view.v, view.length);
   Ray ray = make_ray(frame, ray_id);
   HitRecord hit = no_hit();
+  BlockCoords b;
   int x, y, z;
   float t;
   if (along.d == 0.0f) return hit;
   t = plane_t(along, 0.0f).hi;
   if ((layers->whole_slices >> slice & 1u) == 0) clip_ray(frame, clip, ray_id, &ray);
   if (!(t >= ray.begin_t && t <= ray.end_t && t < INFINITY)) return hit;
-  x = field_cell(fma(t, ray.x.d, ray.x.o), frame->grid.dims_x, &hit.x);
-  y = field_cell(fma(t, ray.y.d, ray.y.o), frame->grid.dims_y, &hit.y);
-  z = field_cell(fma(t, ray.z.d, ray.z.o), frame->grid.dims_z, &hit.z);
+  x = field_cell(fma(t, ray.x.d, ray.x.o), ray.x.origin, frame->grid.dims_x, &hit.x);
+  y = field_cell(fma(t, ray.y.d, ray.y.o), ray.y.origin, frame->grid.dims_y, &hit.y);
+  z = field_cell(fma(t, ray.z.d, ray.z.o), ray.z.origin, frame->grid.dims_z, &hit.z);
   if (x < 0 || y < 0 || z < 0) return no_hit();
+  b.x = (uint)(x >> 2);
+  b.y = (uint)(y >> 2);
+  b.z = (uint)(z >> 2);
+  if (!is_own(frame, b)) return no_hit();
   hit.t = t * frame->view.t_scale;
-  hit.block_id = block_id_at(frame, (uint)(x >> 2), (uint)(y >> 2), (uint)(z >> 2));
+  hit.block_id = block_id_at(frame, b.x, b.y, b.z);
   hit.cell = (uint)((x & 3) + 4 * (y & 3) + 16 * (z & 3)) | ISO_CAP |
              (layers->num_surfaces + slice) << ISO_SURFACE_BIT;
   hit.grad_x = plane->grad_x;

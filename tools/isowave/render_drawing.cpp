@@ -118,7 +118,7 @@ void load_alone(RenderArgs &options, Drawing &drawing) {
   }
 }
 
-void load_bricks(const RenderArgs &options, Drawing &drawing) {
+void load_bricks(RenderArgs &options, Drawing &drawing) {
   TeamVolumeSource source;
   source.path = options.input;
   source.overrides = to_overrides(options.volume);
@@ -133,6 +133,19 @@ void load_bricks(const RenderArgs &options, Drawing &drawing) {
     if (options.voxel_pixels == 0 && !chooses_levels(options, drawing)) levels.resize(1);
     drawing.cameras = make_cameras(options.input, levels.front(), options.frame, drawing.views);
   });
+  if (!options.color_map.by_field) return;
+  const std::string &field = options.color_map.field;
+  options.renderer_flags.values.field = &drawing.bricks->brick;
+  if (field == "volume") return;
+  TeamVolumeSource of_field;
+  of_field.path = field;
+  together(drawing.team, [&] {
+    of_field.storage =
+        storage_for(field, is_zfp_name(field) ? CompressionOptions{} : options.frame.compression,
+                    drawing.device.get());
+  });
+  drawing.other = open_field_together(drawing.team, of_field, *drawing.bricks);
+  options.renderer_flags.values.field = &drawing.other;
 }
 
 namespace {

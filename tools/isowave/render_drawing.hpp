@@ -58,8 +58,8 @@ void take_step(RenderArgs &options, Drawing &drawing, std::size_t index);
 
 /// Loads the volume of one process, or the first of a series, and its field, if there is one.
 void load_alone(RenderArgs &options, Drawing &drawing);
-/// Loads the bricks of all processes.
-void load_bricks(const RenderArgs &options, Drawing &drawing);
+/// Loads the bricks of all processes, and of the field, if there is one.
+void load_bricks(RenderArgs &options, Drawing &drawing);
 
 /// Makes drawing.renderer for what is loaded.
 void make_renderer(RenderArgs &options, Drawing &drawing);

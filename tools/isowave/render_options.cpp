@@ -123,7 +123,7 @@ void check_choice(const RenderArgs &options) {
 }
 
 /// Checks what --slice excludes.
-void check_slice_options(const CLI::App &command, const RenderArgs &options, const Team &team) {
+void check_slice_options(const CLI::App &command, const RenderArgs &options) {
   if (options.slice_options.planes.empty() && options.slices.empty()) return;
   isowave::Appearance appearance;
   const std::size_t num_slices =
@@ -132,7 +132,6 @@ void check_slice_options(const CLI::App &command, const RenderArgs &options, con
   if (num_surfaces + num_slices > ISO_MAX_SURFACES)
     throw Error("{} surfaces and {} slices are more than a frame can have: give at most {}",
                 num_surfaces, num_slices, ISO_MAX_SURFACES);
-  if (team.size() > 1) throw Error("--slice: a team draws without slices");
   refuse_options(
       command,
       {"--voxel-pixels", "--max-surface-error", "--max-image-error", "--time-budget", "--bounce"},
@@ -151,7 +150,8 @@ void check_light_rays(const RenderArgs &options) {
 
 /// Checks what --labels excludes.
 void check_label_options(const CLI::App &command, const RenderArgs &options, const Team &team) {
-  if (team.size() > 1) throw Error("labels are drawn by one process alone: leave out mpirun");
+  if (team.size() > 1 && options.bricks == "active")
+    throw Error("--bricks active counts blocks of isosurfaces: labels are drawn without it");
   refuse_options(command, {"--isovalue", "--surface"},
                  "--labels draws surfaces of labels alone: leave out either");
   refuse_options(command, {"--color"}, "surfaces have colours of their own: --labels LABELS,COLOR");
@@ -182,17 +182,11 @@ void check_surface_options(const CLI::App &command, const RenderArgs &options, c
       command,
       {"--voxel-pixels", "--max-surface-error", "--max-image-error", "--time-budget", "--bounce"},
       "--surface draws without it: leave it out, or draw one surface by --isovalue");
-  if (team.size() > 1)
-    refuse_options(command, {"--ambient", "--shadow"},
-                   "with mpirun, --surface draws without it: leave out either");
   check_light_rays(options);
   if (options.renderer_flags.pipeline == "blocks")
     refuse_options(command, {"--surface"}, "--pipeline blocks draws one opaque surface");
   if (solver_from_string(options.renderer_flags.solver).kind != kDefaultSolver.kind)
     refuse_options(command, {"--surface"}, "needs --solver bernstein");
-  if (team.size() > 1)
-    refuse_options(command, {"--progress-dir"},
-                   "with mpirun, --surface draws no pictures of passes: leave out either");
 }
 
 /// Checks --movie and --turntable.
@@ -223,7 +217,7 @@ void count_turntable(const RenderArgs &options, Views &views) {
 
 void check_options(const CLI::App &command, const RenderArgs &options, const Team &team) {
   check_surface_options(command, options, team);
-  check_slice_options(command, options, team);
+  check_slice_options(command, options);
   check_movie_options(command, options);
   if (team.size() > 1) {
     refuse_options(command, {"--reference", "--verbose"},
@@ -248,10 +242,11 @@ void check_options(const CLI::App &command, const RenderArgs &options, const Tea
     refuse_options(command, {"--annotate", "--units"}, "no picture is annotated: give --output");
   if (!options.color_map.by.empty() && !options.color_map.by_field)
     refuse_options(command, {"--color"}, "--color-by colours surfaces: leave out either");
-  if (options.color_map.by_field) {
-    if (team.size() > 1) throw Error("colours by a field: a team draws without them");
+  if (options.color_map.by_field)
     refuse_options(command, {"--time-budget"}, "colours by a field are drawn without a time");
-  }
+  if (team.size() > 1 && draws_layers(options))
+    refuse_options(command, {"--progress-dir"},
+                   "with mpirun, surfaces and slices have no pictures of passes: leave it out");
   if (team.size() > 1)
     refuse_options(command, {"--bounce"}, "a team draws without bounced light: leave out either");
   if (options.transparent)

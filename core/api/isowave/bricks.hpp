@@ -37,9 +37,13 @@ class Processes {
 };
 
 struct BrickOptions {
-  std::string device{};        ///< open_device()'s selector; or several with commas, one a process
-  std::string bricks{};        ///< XxYxZ: bricks along each axis; empty: bricks of equal size
-  RendererOptions renderer{};  ///< options of each process
+  std::string device{};  ///< open_device()'s selector; or several with commas, one a process
+  std::string bricks{};  ///< XxYxZ: bricks along each axis; empty: bricks of equal size
+  /// File of the field for Appearance::color_by_field, which may be that of the volume. Each
+  /// process keeps what its brick needs. A file that is not compressed is compressed like the
+  /// volume.
+  std::filesystem::path field{};
+  RendererOptions renderer{};  ///< options of each process, without a field
 };
 
 /// Makes a renderer for several processes, each with a brick. All processes make the same calls.
