@@ -181,14 +181,37 @@ TEST_P(BrickTeamOnDevice, Shadows) {
   });
 }
 
-TEST_P(BrickTeamOnDevice, BouncedLightIsRefused) {
-  const RendererOptions options{.size = kFrame, .with_bounce = true};
-  request_.bounce_rays = 1;
+/// Light comes by way of places in other bricks. Passes show the rounds so far.
+TEST_P(BrickTeamOnDevice, BouncedLight) {
+  request_.bounce_rays = 3;
   request_.light.towards_light = glm::dvec3(0.5, 1, -0.3);
-  on_ranks(2, options, [&](TeamRenderer &renderer, std::uint32_t) {
-    EXPECT_THAT([&] { renderer.render(request_); },
-                testing::ThrowsMessage<Error>(testing::HasSubstr("a team draws without bounced")));
-  });
+  const glm::dvec3 middle = 0.5 * glm::dvec3(volume_.info().dims - 1u);
+  for (const std::uint32_t shadow_rays : {0u, 2u}) {
+    const RendererOptions options{.size = kFrame, .with_bounce = true};
+    request_.shadow_rays = shadow_rays;
+    if (shadow_rays != 0) request_.clip = {{{{0.1, 1, 0.2}, glm::dot({0.1, 1, 0.2}, middle)}}};
+    const Image8 whole = picture_of_one(request_, options, request_.light);
+    FrameRequest plain = request_;
+    plain.bounce_rays = 0;
+    EXPECT_NE(picture_of_one(plain, options, request_.light).pixels, whole.pixels);
+    on_ranks(4, options, [&](TeamRenderer &renderer, std::uint32_t rank) {
+      for (const bool in_step : {false, true}) {
+        FrameRequest request = request_;
+        std::size_t num_images = 0;
+        if (in_step) {
+          request.on_pass = [&](const PassStats &) {
+            num_images += renderer.shade(request.light).pixels.empty() ? 0 : 1;
+            return true;
+          };
+        }
+        renderer.render(request);
+        const Image8 image = renderer.shade(request.light);
+        if (rank != 0) continue;
+        EXPECT_EQ(image.pixels, whole.pixels);
+        EXPECT_EQ(num_images > 3, in_step);
+      }
+    });
+  }
 }
 
 /// What is seen through bricks is blended in their order, up to 16 crossings of all bricks.

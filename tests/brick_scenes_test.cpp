@@ -115,7 +115,8 @@ TEST_P(BrickScenesOnDevice, Slices) {
     request_.clip = {{{{0.3, 1, 0.2}, 9}}, true};
     const RendererOptions options{.max_surfaces = 1, .with_given_rays = true};
     const Shown whole = expect_of_one(volume_.compressed, nullptr, options, request_);
-    const Shown holes = expect_of_one(with_holes.compressed, nullptr, options, request_);
+    const Shown holes =
+        expect_of_one(with_holes.compressed, nullptr, {.max_surfaces = 1}, request_);
     EXPECT_NE(holes.picture.pixels, whole.picture.pixels);
     EXPECT_GT(whole.layers.layers, 4u);
     // Behind an opaque surface, no brick's hits count.
@@ -186,7 +187,7 @@ TEST_P(BrickScenesOnDevice, LayersWithColorsByAField) {
   }
 }
 
-/// Groups of labels, as layers with light, with the colours of their own labels.
+/// Groups of labels, with the colours of their own labels.
 TEST_P(BrickScenesOnDevice, Labels) {
   VolumeInfo info = test::grid_info({33, 30, 29});
   info.spacing = {0.5, 0.7, 0.4};
@@ -203,8 +204,7 @@ TEST_P(BrickScenesOnDevice, Labels) {
   one.labels = {7, 300};
   two.labels = {65535};
   request_.surfaces = {one, two};
-  request_.ambient_rays = 1;
-  const RendererOptions options{.max_surfaces = 2, .with_labels = true, .with_given_rays = true};
+  const RendererOptions options{.max_surfaces = 2, .with_labels = true};
   const Shown own = expect_of_one(volume, nullptr, options, request_);
   EXPECT_GT(own.layers.layers, 2u);
   request_.field_values = request_.field_labels = true;

@@ -291,16 +291,15 @@ class AmbientBricksOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
       for (std::uint32_t round = 0; round < num_rays; ++round) {
         std::vector<bool> is_met(num_pixels);
         for (std::size_t brick = 0; brick < bricks.size(); ++brick) {
-          if (round == 0) {
-            renderers[brick]->begin_ambient({.camera = cameras[view], .isovalue = kIsovalue},
-                                            placed, levels);
-          }
+          const FrameRequest lit{
+              .camera = cameras[view], .isovalue = kIsovalue, .ambient_rays = num_rays};
+          if (round == 0) renderers[brick]->begin_ambient(lit, placed, levels);
           LaterPasses stats;
-          const auto blocked =
-              renderers[brick]->blocked_rays(round, {.num_ambient = num_rays}, stats);
+          const auto blocked = renderers[brick]->blocked_rays(lit, round, stats);
           EXPECT_GT(stats.passes, 0u);
           for (std::size_t pixel = 0; pixel < num_pixels; ++pixel) {
-            const bool meets = (blocked[pixel / 64] >> pixel % 64 & 1) != 0;
+            const bool meets =
+                std::isfinite(placed[pixel].t) && (blocked[pixel / 64] >> pixel % 64 & 1) != 0;
             num_met_elsewhere += meets && place[pixel] != places[brick];
             is_met[pixel] = is_met[pixel] || meets;
           }

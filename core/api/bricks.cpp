@@ -73,14 +73,14 @@ struct TeamHeld {
 /// A text of the options in which all processes must agree.
 std::string text_of(const BrickOptions &options, const core::Storage &storage) {
   const RendererOptions &renderer = options.renderer;
-  return fmt::format("{} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {}",
-                     renderer.largest.width, renderer.largest.height, renderer.largest.samples,
-                     renderer.with_levels, renderer.with_bounds, renderer.with_time_budget,
-                     renderer.with_rays, renderer.with_surfaces, renderer.with_labels,
-                     options.bricks, options.field.string(), storage.rate.value_or(0),
-                     storage.tolerance.value_or(0), storage.relative_tolerance.value_or(0),
-                     storage.exact, storage.levels, storage.map_nan.value_or(0),
-                     storage.no_data ? fmt::to_string(*storage.no_data) : "none");
+  return fmt::format(
+      "{} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {}", renderer.largest.width,
+      renderer.largest.height, renderer.largest.samples, renderer.with_levels, renderer.with_bounds,
+      renderer.with_time_budget, renderer.with_rays, renderer.with_bounce, renderer.with_surfaces,
+      renderer.with_labels, options.bricks, options.field.string(), storage.rate.value_or(0),
+      storage.tolerance.value_or(0), storage.relative_tolerance.value_or(0), storage.exact,
+      storage.levels, storage.map_nan.value_or(0),
+      storage.no_data ? fmt::to_string(*storage.no_data) : "none");
 }
 
 /// Opens device and volume, at all processes.

@@ -44,6 +44,12 @@ void set_field(std::span<const std::uint64_t> words, HitField field, std::span<H
   }
 }
 
+void field_words(std::span<const HitRecord> hits, HitField field,
+                 std::span<const std::uint32_t> places, std::span<std::uint64_t> words) {
+  for (std::size_t ray = 0; ray < hits.size(); ++ray)
+    field_words(hits.subspan(ray, 1), field, places[ray], words.subspan(ray, 1));
+}
+
 void number_words(std::span<const HitRecord> hits, std::span<const float> numbers,
                   std::uint32_t place, std::span<std::uint64_t> words) {
   for (std::size_t ray = 0; ray < hits.size(); ++ray)

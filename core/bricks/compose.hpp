@@ -29,6 +29,9 @@ void field_words(std::span<const HitRecord> hits, HitField field, std::uint32_t 
 /// Gives hits [ray] the field that won.
 void set_field(std::span<const std::uint64_t> words, HitField field, std::span<HitRecord> hits);
 
+/// The same of hits whose bricks have another place for each ray.
+void field_words(std::span<const HitRecord> hits, HitField field,
+                 std::span<const std::uint32_t> places, std::span<std::uint64_t> words);
 /// The same of a number of each hit.
 void number_words(std::span<const HitRecord> hits, std::span<const float> numbers,
                   std::uint32_t place, std::span<std::uint64_t> words);

@@ -28,6 +28,8 @@ constexpr std::size_t kBlendedWords = 2, kPlacedWords = 4;
 using SentWords = std::array<std::uint64_t, kPlacedWords>;
 static_assert(sizeof(SentHit) == sizeof(SentWords));
 
+}  // namespace
+
 /// A brick's hits: those of each ray in the order in which the ray meets them.
 class HitsOfRays {
  public:
@@ -99,8 +101,6 @@ class HitOrder {
   const LayerParams &params_;
   std::vector<std::uint32_t> numbers_;
 };
-
-}  // namespace
 
 /// Puts the layers of all bricks together. Members but `colors` are alike at all ranks.
 class TeamRenderer::Layering {

@@ -15,6 +15,7 @@
 #include "core/frame/field_values.hpp"
 #include "core/frame/surface_camera.hpp"
 #include "core/view/detail.hpp"
+#include "kernels_cl/portable/bounce.h"
 
 namespace isowave::core {
 
@@ -179,6 +180,93 @@ void TeamRenderer::cast_round(const FrameRequest &request, std::uint32_t round,
   }
 }
 
+/// The levels of detail that draw the frame of the whole volume.
+LevelRange TeamRenderer::drawn_levels(const FrameRequest &request) const {
+  const std::vector<FrameParams> frames =
+      make_level_frames(std::span(whole_levels_).first(num_levels_), request.camera,
+                        renderer_.size(), request.isovalue, request.voxel_pixels);
+  const auto first = std::ranges::find_if(frames, draws);
+  const auto end = std::find_if_not(first, frames.end(), draws);
+  return {static_cast<std::size_t>(first - frames.begin()),
+          static_cast<std::size_t>(end - frames.begin())};
+}
+
+/// What rays meet in all bricks, at all ranks.
+///
+/// own   met in this brick
+std::vector<HitRecord> TeamRenderer::compose_met(std::span<const HitRecord> own,
+                                                 std::span<const GivenRay> rays) {
+  // Rays whose directions have the same signs go through the bricks in the same order.
+  std::array<std::uint32_t, 8> place_of{};
+  const auto octant_of = [](const GivenRay &ray) {
+    return std::size_t{ray.d_x < 0} + 2 * std::size_t{ray.d_y < 0} + 4 * std::size_t{ray.d_z < 0};
+  };
+  for (std::size_t octant = 0; octant < place_of.size(); ++octant) {
+    const auto begin = [&](std::size_t bit) { return (octant & bit) != 0 ? 0x1p100f : -0x1p100f; };
+    place_of[octant] = cuts_.order_from({begin(1), begin(2), begin(4)})[team_.rank()];
+  }
+  std::vector<std::uint32_t> places(rays.size());
+  std::ranges::transform(rays, places.begin(),
+                         [&](const GivenRay &ray) { return place_of[octant_of(ray)]; });
+  std::vector<HitRecord> met(own.size(), no_hit());
+  for (const HitField field : kHitFields) {
+    reduce(
+        own.size(), Reduction::kMin, Receiver::kAll,
+        [&](std::size_t begin, std::span<std::uint64_t> words) {
+          field_words(own.subspan(begin, words.size()), field,
+                      std::span(places).subspan(begin, words.size()), words);
+        },
+        [&](std::size_t begin, std::span<const std::uint64_t> words) {
+          set_field(words, field, std::span(met).subspan(begin, words.size()));
+        });
+  }
+  return met;
+}
+
+/// A round of ambient rays that bring light: all ranks get what the rays meet in any brick, and
+/// cast rays from there towards the light. Rank 0 adds the light of those that meet nothing.
+void TeamRenderer::bounce_round(const FrameRequest &request, std::uint32_t round,
+                                std::span<const HitRecord> placed, OpenCounts &open,
+                                LaterPasses &stats) {
+  const LightRays light_rays = light_rays_of(request);
+  std::vector<HitRecord> own;
+  std::vector<GivenRay> rays;
+  together(team_, [&] {
+    own = renderer_.met_hits(request, round, stats);
+    rays = renderer_.light_rays();
+  });
+  const std::vector<HitRecord> met = compose_met(own, rays);
+  const VolumeInfo &level = whole_levels_[drawn_levels(request).first];
+  const AmbientParams params = make_ambient_params(level, light_rays.num_ambient);
+  const FrameParams frame =
+      make_frame_params(level, request.camera, renderer_.size(), request.isovalue);
+  const std::vector<AmbientDirection> directions = make_light_directions(light_rays);
+  const std::size_t row = light_rays.num_ambient + light_row(light_rays.num_shadow, round);
+  std::vector<float> brings(rays.size());
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    if (!is_given(rays[i])) continue;
+    const bool meets = std::isfinite(met[i].t);
+    const uint pattern = ambient_pattern(&frame, static_cast<uint>(i));
+    rays[i] = meets ? bounce_ray(&params, rays[i], met[i],
+                                 directions[row * ISO_AMBIENT_PATTERNS + pattern], &brings[i])
+                    : no_ray();
+    if (!meets) ++open.counts[i];
+  }
+  ++open.num_ambient;
+  std::vector<std::uint64_t> blocked;
+  together(team_, [&] {
+    renderer_.set_light_rays(rays);
+    blocked = renderer_.blocked_rays(request, round, stats, true);
+  });
+  const auto [make, take] = in_place(blocked);
+  reduce(blocked.size(), Reduction::kOr, Receiver::kRank0, make, take);
+  ++open.num_bounced;
+  open.bounced.resize(placed.size());
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    if (is_given(rays[i]) && (blocked[i / 64] >> i % 64 & 1) == 0) open.bounced[i] += brings[i];
+  }
+}
+
 /// All ranks get the hits that are seen, and each casts their rays through its brick.
 void TeamRenderer::add_ambient(const FrameRequest &request, FrameStats &stats) {
   std::vector<HitRecord> own;
@@ -190,20 +278,17 @@ void TeamRenderer::add_ambient(const FrameRequest &request, FrameStats &stats) {
   const LightRays light_rays = light_rays_of(request);
   const std::vector<float> values = has_field_values() ? compose_values() : std::vector<float>();
   together(team_, [&] {
-    const std::vector<FrameParams> frames =
-        make_level_frames(std::span(whole_levels_).first(num_levels_), request.camera,
-                          renderer_.size(), request.isovalue, request.voxel_pixels);
-    const auto first = std::ranges::find_if(frames, draws);
-    const auto end = std::find_if_not(first, frames.end(), draws);
-    renderer_.begin_ambient(request, placed,
-                            {static_cast<std::size_t>(first - frames.begin()),
-                             static_cast<std::size_t>(end - frames.begin())});
+    renderer_.begin_ambient(request, placed, drawn_levels(request));
     if (!values.empty()) renderer_.set_field_values(values);
   });
   has_whole_ = true;
   OpenCounts open = no_counts(light_rays, placed.size());
   for (std::uint32_t round = 0; round < light_rays.count() && !stats.cancelled; ++round) {
-    cast_round(request, round, placed, open, stats.ambient);
+    if (light_rays.bounces && round < light_rays.num_ambient) {
+      bounce_round(request, round, placed, open, stats.ambient);
+    } else {
+      cast_round(request, round, placed, open, stats.ambient);
+    }
     const bool is_last = round + 1 == light_rays.count();
     if (!is_last && !request.on_pass) continue;
     together(team_, [&] {
@@ -213,6 +298,8 @@ void TeamRenderer::add_ambient(const FrameRequest &request, FrameStats &stats) {
       stats.cancelled = request.on_pass && !request.on_pass(pass) && !is_last;
     });
   }
+  if (light_rays.bounces && !stats.cancelled)
+    together(team_, [&] { renderer_.filter_bounced(request); });
 }
 
 std::vector<float> TeamRenderer::compose_values() {

@@ -38,7 +38,7 @@ class TeamRenderer : public Renderer {
 
   Abilities abilities() const override {
     Abilities abilities = renderer_.abilities();
-    abilities.cells = abilities.bounce = false;
+    abilities.cells = false;
     return abilities;
   }
   Team &team() override { return team_; }
@@ -93,6 +93,11 @@ class TeamRenderer : public Renderer {
   class Layering;
   void cast_round(const FrameRequest &request, std::uint32_t round,
                   std::span<const HitRecord> placed, OpenCounts &open, LaterPasses &stats);
+  LevelRange drawn_levels(const FrameRequest &request) const;
+  void bounce_round(const FrameRequest &request, std::uint32_t round,
+                    std::span<const HitRecord> placed, OpenCounts &open, LaterPasses &stats);
+  std::vector<HitRecord> compose_met(std::span<const HitRecord> own,
+                                     std::span<const GivenRay> rays);
   void add_ambient(const FrameRequest &request, FrameStats &stats);
   void reduce(std::size_t count, Reduction how, Receiver who, const MakeWords &make,
               const TakeWords &take);

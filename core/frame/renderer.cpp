@@ -163,8 +163,7 @@ void check(const FrameRequest &request, const Abilities &abilities) {
   need(request.shadow_rays != 0, abilities.given_rays,
        "shadow rays need a renderer that was made with_rays");
   need(request.bounce_rays != 0, abilities.bounce,
-       abilities.cells ? "bounced light needs a renderer that was made with_bounce"
-                       : "a team draws without bounced light: leave it out");
+       "bounced light needs a renderer that was made with_bounce");
   need_choices(request, abilities);
 }
 

@@ -1,14 +1,21 @@
 // What a brick's renderer does for the light rays of whole frames (core/bricks).
 
+#include <cmath>
 #include <limits>
 
 #include "core/base/error.hpp"
 #include "core/render/device_renderer.hpp"
+#include "kernels_cl/portable/clip.h"
 
 namespace isowave::core {
 
 std::vector<HitRecord> DeviceRenderer::placed_hits() {
-  std::vector<HitRecord> hits = this->hits();
+  return placed(hits(), blocks_.drawing.first);
+}
+
+/// placed_hit()s, whose levels of detail count on from first_level.
+std::vector<HitRecord> DeviceRenderer::placed(std::vector<HitRecord> hits,
+                                              std::size_t first_level) const {
   const bool has_level_ids =
       blocks_.level_frames->size() > 1 || blocks_.level_frames->front().place.begin_z != 0;
   for (HitRecord &hit : hits) {
@@ -19,7 +26,7 @@ std::vector<HitRecord> DeviceRenderer::placed_hits() {
       ++level;
     const FrameParams &frame = (*blocks_.level_frames)[level];
     if (has_level_ids) hit.block_id = level_block_of(&frame, hit.block_id);
-    hit = placed_hit(&frame, static_cast<uint>(blocks_.drawing.first + level), hit);
+    hit = placed_hit(&frame, static_cast<uint>(first_level + level), hit);
   }
   return hits;
 }
@@ -51,31 +58,84 @@ void DeviceRenderer::begin_ambient(const FrameRequest &request, std::vector<HitR
   open_frame(std::move(frames), decoded_values(request), FieldBound::kNone, RaySource::kGiven);
 }
 
+/// Opens a round of light rays of a brick. Rays of the frame are those of the camera again.
+class DeviceRenderer::BrickRound {
+ public:
+  BrickRound(DeviceRenderer &of, const FrameRequest &request, LaterPasses &stats)
+      : frame{never_stops_, 1}, of_(of), stats_(stats) {
+    of_.rays_.frame = of_.blocks_.level_frames->front();
+    const std::size_t level = of_.blocks_.drawing.first;
+    of_.ambient_->begin(of_.blocks_.levels[level].info, level, light_rays_of(request));
+  }
+  ~BrickRound() { of_.rays_.frame = of_.blocks_.levels[0].frame; }  // for shading
+  BrickRound(const BrickRound &) = delete;
+  BrickRound &operator=(const BrickRound &) = delete;
+
+  /// After the round's passes.
+  void close() {
+    of_.blocks_.close(frame.stats.ambient.recycled_blocks, true);
+    stats_ += frame.stats.ambient;
+  }
+
+ private:
+  OnPass never_stops_;
+
+ public:
+  Frame frame;
+
+ private:
+  DeviceRenderer &of_;
+  LaterPasses &stats_;
+};
+
 std::vector<std::uint64_t> DeviceRenderer::blocked_rays(const FrameRequest &request,
-                                                        std::uint32_t round, LaterPasses &stats) {
-  rays_.frame = blocks_.level_frames->front();
-  const VolumeInfo &info = blocks_.levels[blocks_.drawing.first].info;
-  ambient_->begin(info, blocks_.drawing.first, light_rays_of(request));
-  const OnPass never_stops;
-  Frame frame{never_stops, 1};
+                                                        std::uint32_t round, LaterPasses &stats,
+                                                        bool goes_on) {
+  BrickRound at_work(*this, request, stats);
   if (request.surfaces.empty()) {
-    cast_round(round, frame);
+    cast_round(round, at_work.frame, goes_on);
     ambient_->block(rays_);
   } else {
     const ClipParams clip =
         make_clip_params(blocks_.levels[0].info, rays_.frame.view, request.camera, request.clip);
-    cast_layer_round(round, request, clip, isovalues_of_layers(request.surfaces), frame);
+    cast_layer_round(round, request, clip, isovalues_of_layers(request.surfaces), at_work.frame);
   }
-  const LaterPasses &passes = frame.stats.ambient;
-  rays_.frame = blocks_.levels[0].frame;  // for shading
-  std::vector<GivenRay> left(size_.num_rays());
-  rays_.given.read(left);
+  const std::vector<GivenRay> left = light_rays();
   std::vector<std::uint64_t> blocked((left.size() + 63) / 64);
   for (std::size_t ray = 0; ray < left.size(); ++ray)
     blocked[ray / 64] |= std::uint64_t{!is_given(left[ray])} << ray % 64;
-  blocks_.close(passes.recycled_blocks, true);
-  stats += passes;
+  at_work.close();
   return blocked;
+}
+
+std::vector<HitRecord> DeviceRenderer::met_hits(const FrameRequest &request, std::uint32_t round,
+                                                LaterPasses &stats) {
+  BrickRound at_work(*this, request, stats);
+  cast_round(round, at_work.frame);
+  std::vector<HitRecord> met(size_.num_rays());
+  rays_.given_hits.read(met);
+  const std::vector<GivenRay> rays = light_rays();
+  const float voxel = std::ldexp(1.0f, static_cast<int>(blocks_.drawing.first));
+  for (std::size_t ray = 0; ray < met.size(); ++ray) {
+    if (!is_given(rays[ray])) met[ray] = no_hit();
+    if (met[ray].t == std::numeric_limits<float>::infinity()) continue;
+    const float in_first = std::ldexp(1.0f, static_cast<int>(rays[ray].level));
+    if (is_clipped(&rays_.clip_params(), rays[ray], voxel * in_first,
+                   met[ray].t / (rays_.frame.view.t_scale * in_first)))
+      met[ray] = no_hit();
+  }
+  at_work.close();
+  return placed(std::move(met), 0);
+}
+
+std::vector<GivenRay> DeviceRenderer::light_rays() const {
+  std::vector<GivenRay> rays(size_.num_rays());
+  rays_.given.read(rays);
+  return rays;
+}
+
+void DeviceRenderer::set_light_rays(std::span<const GivenRay> rays) {
+  rays_.given.write(rays);
 }
 
 void DeviceRenderer::set_open(const OpenCounts &open) {
@@ -84,6 +144,16 @@ void DeviceRenderer::set_open(const OpenCounts &open) {
   rays_.open_counts.write(open.counts);
   rays_.num_ambient = open.num_ambient;
   rays_.num_shadow = open.num_shadow;
+  rays_.num_bounced = open.num_bounced;
+  if (open.num_bounced != 0) rays_.bounced.write(open.bounced);
+}
+
+void DeviceRenderer::filter_bounced(const FrameRequest &request) {
+  rays_.frame = blocks_.level_frames->front();
+  const std::size_t level = blocks_.drawing.first;
+  bounce_->begin(blocks_.levels[level].info, level, light_rays_of(request));
+  bounce_->filter(rays_);
+  rays_.frame = blocks_.levels[0].frame;  // for shading
 }
 
 void DeviceRenderer::set_field_values(std::span<const float> values) {

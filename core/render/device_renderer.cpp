@@ -173,8 +173,10 @@ void DeviceRenderer::add_stage_times(LaterPasses &passes) {
 }
 
 /// Casts one light ray of each hit.
-void DeviceRenderer::cast_round(std::uint32_t round, Frame &frame) {
-  ambient_round_->set_round(round);
+///
+/// goes_on  the rays have been made already
+void DeviceRenderer::cast_round(std::uint32_t round, Frame &frame, bool goes_on) {
+  ambient_round_->set_round(round, goes_on);
   run(*ambient_round_, frame);
 }
 
@@ -185,8 +187,7 @@ void DeviceRenderer::bounce_round(std::uint32_t round, Frame &frame) {
     const auto stage = device_.timer().stage("bounce");
     bounce_->go_to_light(rays_, round);
   }
-  ambient_round_->set_round(round, true);
-  run(*ambient_round_, frame);
+  cast_round(round, frame, true);
   if (frame.stats.cancelled) return;
   const auto stage = device_.timer().stage("bounce");
   bounce_->add(rays_, round);

@@ -130,12 +130,24 @@ class DeviceRenderer : public Renderer {
   ///
   /// request  as for begin_ambient()
   /// round    0..light_rays_of(request).count() - 1
+  /// goes_on  casts the rays that set_light_rays() has set
   /// Returns  bits [(rays + 63) / 64]: 1 if the ray meets a surface in this brick, or there is none
   /// Waits    yes
   std::vector<std::uint64_t> blocked_rays(const FrameRequest &request, std::uint32_t round,
-                                          LaterPasses &stats);
-  /// Sets the counts that pictures have instead of open(). Waits.
+                                          LaterPasses &stats, bool goes_on = false);
+  /// The same of a frame of one surface, if its ambient rays bring light.
+  ///
+  /// Returns  what the rays meet in this brick: placed_hit()s, of levels that count from
+  ///          begin_ambient()'s first one
+  std::vector<HitRecord> met_hits(const FrameRequest &request, std::uint32_t round,
+                                  LaterPasses &stats);
+  /// The rays of the last round, [height * width]. Both wait.
+  std::vector<GivenRay> light_rays() const;
+  void set_light_rays(std::span<const GivenRay> rays);
+  /// Sets the counts that pictures have instead of open(), with light that is not filtered. Waits.
   void set_open(const OpenCounts &open);
+  /// Filters that light, at the placed hits of begin_ambient().
+  void filter_bounced(const FrameRequest &request);
 
   /// These three throw Error without options().with_kept_picture.
   void keep_picture() override;
@@ -171,6 +183,7 @@ class DeviceRenderer : public Renderer {
 
   /// Makes rays_.hits the picture so far, while waves of layers have other hits there.
   class PictureSoFar;
+  class BrickRound;
 
   void run(Wave &wave, Frame &frame, Wave *next = nullptr);
   void compile_kernels();
@@ -186,7 +199,8 @@ class DeviceRenderer : public Renderer {
   std::vector<DecodedValues> decoded_values(const FrameRequest &request) const;
   PassStats stats_of(const PassCounts &counts, BlockStore &blocks);
   void light_surface(const LightRays &light_rays, Frame &frame);
-  void cast_round(std::uint32_t round, Frame &frame);
+  void cast_round(std::uint32_t round, Frame &frame, bool goes_on = false);
+  std::vector<HitRecord> placed(std::vector<HitRecord> hits, std::size_t first_level) const;
   void bounce_round(std::uint32_t round, Frame &frame);
   void count_last_round(std::uint32_t num_rounds, Frame &frame);
   void add_stage_times(LaterPasses &passes);

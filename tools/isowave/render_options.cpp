@@ -247,8 +247,6 @@ void check_options(const CLI::App &command, const RenderArgs &options, const Tea
   if (team.size() > 1 && draws_layers(options))
     refuse_options(command, {"--progress-dir"},
                    "with mpirun, surfaces and slices have no pictures of passes: leave it out");
-  if (team.size() > 1)
-    refuse_options(command, {"--bounce"}, "a team draws without bounced light: leave out either");
   if (options.transparent)
     refuse_options(command, {"--background"}, "pictures with --transparent have none");
   if (options.stats.empty())

@@ -326,6 +326,7 @@ class PyRenderer {
     const auto get = reader_of(options);
     get("device", wanted.device);
     get("bricks", wanted.bricks);
+    get("field", wanted.field);
     wanted.renderer = renderer_options_of(options);
     const isowave::Compression how = compression_of(compression);
     auto result = std::make_unique<PyRenderer>();

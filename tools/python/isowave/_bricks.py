@@ -22,16 +22,9 @@ from isowave._request import Request, isovalue_or_surfaces
 from isowave._surface import Surface
 
 OUTPUTS = ("rgb", "depth", "normals")
-ALL_OUTPUTS = (*OUTPUTS, "bounds")
+ALL_OUTPUTS = (*OUTPUTS, "bounds", "field")
 
 Result = TypeVar("Result")
-
-
-def without_labels(request: Request) -> Request:
-    """The request itself. Raises TypeError if it has surfaces of labels."""
-    if request.has_labels:
-        raise TypeError("a BrickRenderer draws without labels")
-    return request
 
 
 class Processes:
@@ -98,7 +91,7 @@ class BrickRenderer(Placed[_core.Renderer]):
         files it reads its layers, and compresses its brick.
     comm
         A communicator of mpi4py, e.g. MPI.COMM_WORLD. The processes of a machine share its devices.
-    device, size, samples, memory_budget, cache_blocks, rays, surfaces
+    device, size, samples, memory_budget, cache_blocks, rays, bounce, surfaces, labels
         As Renderer's, for each process, which needs an OpenCL device. Several devices, with commas,
         are taken in turn.
     levels
@@ -106,6 +99,9 @@ class BrickRenderer(Placed[_core.Renderer]):
     bounds
         Frames may ask for `max_error` and bounds. If the volume is compressed here, its error is
         then measured.
+    field
+        File of a second volume for `ColorMap(by="field")`, which may be `path`. Each process keeps
+        what its brick needs of it. A file that is not compressed is compressed like the volume.
     bricks
         Number of bricks along x, y and z; None: bricks of equal size.
     tolerance, relative_tolerance, rate, exact, map_nan, no_data
@@ -131,7 +127,10 @@ class BrickRenderer(Placed[_core.Renderer]):
         levels: bool = False,
         bounds: bool = False,
         rays: bool = False,
+        bounce: bool = False,
         surfaces: int = 0,
+        labels: bool = False,
+        field: str | os.PathLike[str] | None = None,
         bricks: tuple[int, int, int] | None = None,
         tolerance: float | None = None,
         relative_tolerance: float | None = None,
@@ -147,16 +146,19 @@ class BrickRenderer(Placed[_core.Renderer]):
                 tolerance, relative_tolerance, rate, exact, 1, map_nan, no_data, 0
             )
             compression["measure_error"] = False
-            can = {"levels": levels, "bounds": bounds, "rays": rays}
+            can = {"levels": levels, "bounds": bounds, "rays": rays, "bounce": bounce}
+            can["labels"] = labels
             options = renderer_options(
                 size, samples, memory_budget, cache_blocks, surfaces=surfaces, **can
             )
             options["device"] = "" if device is None else str(device)
             options["bricks"] = None if bricks is None else "{}x{}x{}".format(*bricks)
+            options["field"] = None if field is None else os.fsdecode(field)
             return compression, options
 
         compression, options = self._processes.together(read)
         self.size: tuple[int, int] = (options["width"], options["height"])
+        self._has_labels = labels
         self._core = _core.team_renderer(self._processes, os.fsdecode(path), compression, options)
         if self._processes.rank == 0:
             for notice in self._core.notices:
@@ -187,15 +189,20 @@ class BrickRenderer(Placed[_core.Renderer]):
     ) -> list[Camera]:
         """As Renderer.turntable()."""
 
-        def ask() -> tuple[list[float], int, tuple[int, int]]:
+        def ask() -> tuple[Request, int, tuple[int, int]]:
             value = given_isovalue(isovalue_or_surfaces(isovalue, surfaces))
-            wanted = without_labels(Request(value, surfaces=surfaces)).isovalues
+            wanted = self._checked(Request(value, surfaces=surfaces))
             count = view_count(num_views)
             return wanted, count, self.size if size is None else size_of(size)
 
-        isovalues, count, (width, height) = self._processes.together(ask)
-        cameras = self._core.turntable(isovalues, count, width, height)
+        request, count, (width, height) = self._processes.together(ask)
+        cameras = self._core.turntable(request.values, count, width, height, request.has_labels)
         return [Camera(*camera) for camera in cameras]
+
+    def _checked(self, request: Request) -> Request:
+        if request.has_labels and not self._has_labels:
+            raise _core.Error("labels needs a renderer that was made with labels=True")
+        return request
 
     def render(
         self,
@@ -240,7 +247,7 @@ class BrickRenderer(Placed[_core.Renderer]):
             for name in ("time_budget", "on_pass"):
                 if getattr(request, name) is not None:
                     raise TypeError(f"a BrickRenderer draws without {name}")
-            return without_labels(request)
+            return self._checked(request)
 
         request = self._processes.together(ask)
         if len(set(self._processes.all_gather(b"" if camera is None else b"given"))) > 1:

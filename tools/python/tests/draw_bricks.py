@@ -48,9 +48,24 @@ keep("bounded", bounded.render(40, max_error=0.5, outputs=("rgb", "depth", "boun
 rated = isowave.BrickRenderer(fuel, comm, size=(64, 48), bounds=True, rate=8)
 keep("rated", rated.render(40, voxel_error=2.0, outputs=("bounds", "depth")))
 
-layered = isowave.BrickRenderer(fuel, comm, size=(64, 48), surfaces=2, exact=True)
-both = [isowave.Surface(20, "skin", 0.4), isowave.Surface(90, "blue", 0.7)]
+layered = isowave.BrickRenderer(
+    fuel, comm, size=(64, 48), surfaces=2, rays=True, field=fuel, exact=True
+)
+both = [isowave.Surface(20, "skin", 0.4), isowave.Surface(90, "blue")]
 keep("surfaces", layered.render(surfaces=both))
+slices = [isowave.Slice("z", 14), isowave.Slice("x", 30, 0.5)]
+keep("slices", layered.render(surfaces=both, slices=slices, slice_map="magma", ambient=2))
+by_field = isowave.ColorMap(by="field")
+image = layered.render(
+    90, clip=[isowave.ClipPlane((0, 0, 1), 12)], color_map=by_field, outputs=("rgb", "field")
+)
+if image is not None:
+    pictures["field_rgb"], pictures["field"] = image.rgb, image.field
+groups = [isowave.Surface(labels=[90, 91, 92]), isowave.Surface(labels=range(20, 40), opacity=0.4)]
+labelled = isowave.BrickRenderer(
+    fuel, comm, size=(64, 48), surfaces=2, labels=True, field=fuel, exact=True
+)
+keep("labels", labelled.render(surfaces=groups, color_map=isowave.ColorMap(by="labels")))
 
 errors = {}
 
@@ -66,6 +81,12 @@ def fails(name, work):
 
 
 fails("surfaces", lambda: renderer.render(surfaces=both))
+fails("labels", lambda: layered.render(surfaces=groups))
+fails("field", lambda: renderer.render(40, color_map=by_field))
+fails("no field", lambda: isowave.BrickRenderer(fuel, comm, size=(8, 8), field=folder))
+bounced = isowave.BrickRenderer(fuel, comm, size=(64, 48), bounce=True, exact=True)
+keep("bounce", bounced.render(40, bounce_rays=4, light=(1, 1, 0.5)))
+fails("bounce", lambda: renderer.render(40, bounce_rays=4, light=(0, 0, 1)))
 fails("neither", lambda: renderer.render())
 fails("isovalue", lambda: renderer.render(40 + rank))
 fails("auto", lambda: renderer.render("auto"))

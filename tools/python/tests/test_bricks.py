@@ -78,11 +78,49 @@ def test_the_bits_of_one_process(drawn):
 
 def test_surfaces(drawn):
     pictures, _ = drawn
-    renderer = isowave.open(FUEL, exact=True).renderer(size=(64, 48), surfaces=2)
-    both = [isowave.Surface(20, "skin", 0.4), isowave.Surface(90, "blue", 0.7)]
+    fuel = isowave.open(FUEL, exact=True)
+    renderer = fuel.renderer(size=(64, 48), surfaces=2, rays=True, field=fuel)
+    both = [isowave.Surface(20, "skin", 0.4), isowave.Surface(90, "blue")]
+    outputs = ("rgb", "depth", "normals")
+    expect(pictures, "surfaces", renderer.render(surfaces=both, outputs=outputs))
+    slices = [isowave.Slice("z", 14), isowave.Slice("x", 30, 0.5)]
     expect(
-        pictures, "surfaces", renderer.render(surfaces=both, outputs=("rgb", "depth", "normals"))
+        pictures,
+        "slices",
+        renderer.render(
+            surfaces=both, slices=slices, slice_map="magma", ambient=2, outputs=outputs
+        ),
     )
+    image = renderer.render(
+        90,
+        clip=[isowave.ClipPlane((0, 0, 1), 12)],
+        color_map=isowave.ColorMap(by="field"),
+        outputs=("rgb", "field"),
+    )
+    np.testing.assert_array_equal(pictures["field_rgb"], image.rgb)
+    np.testing.assert_array_equal(pictures["field"], image.field)
+    assert np.isfinite(image.field).any()
+
+
+def test_bounced_light(drawn):
+    pictures, _ = drawn
+    renderer = isowave.open(FUEL, exact=True).renderer(size=(64, 48), bounce=True)
+    outputs = ("rgb", "depth", "normals")
+    image = renderer.render(40, bounce_rays=4, light=(1, 1, 0.5), outputs=outputs)
+    expect(pictures, "bounce", image)
+
+
+def test_labels(drawn):
+    pictures, _ = drawn
+    fuel = isowave.open(FUEL, exact=True)
+    renderer = fuel.renderer(size=(64, 48), surfaces=2, labels=True, field=fuel)
+    groups = [
+        isowave.Surface(labels=[90, 91, 92]),
+        isowave.Surface(labels=range(20, 40), opacity=0.4),
+    ]
+    colors = isowave.ColorMap(by="labels")
+    image = renderer.render(surfaces=groups, color_map=colors, outputs=("rgb", "depth", "normals"))
+    expect(pictures, "labels", image)
 
 
 def test_levels_of_detail(drawn, levelled):
@@ -110,6 +148,10 @@ def test_bounds_of_the_error(drawn, levelled):
     [
         ("isovalue", "rank 1 has another request than rank 0"),
         ("surfaces", "made with_surfaces"),
+        ("labels", "labels needs a renderer that was made with labels=True"),
+        ("field", "no field to colour by"),
+        ("no field", "rank 0: "),
+        ("bounce", "made with_bounce"),
         ("neither", "give an isovalue, or surfaces"),
         ("auto", "isovalue='auto': no process sees the whole volume: give a number"),
         ("auto camera", "isovalue='auto': no process sees the whole volume: give a number"),

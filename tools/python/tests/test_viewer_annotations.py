@@ -346,6 +346,7 @@ def test_screenshots_are_those_of_the_library(open_page: Callable[..., Any]) -> 
             rests(page)
             if name == "narrow":
                 page.get_by_role("button", name="Panel").click()
+                rests(page)  # with the size that the view is then reset for
                 page.get_by_role("button", name="Reset view").click()
             rests(page)
             shown = np.asarray(Image.open(io.BytesIO(screenshot(page)[1])))

@@ -89,6 +89,7 @@ class View {
     this.answered = true; // there is a picture of the last wish, or an error
     this.sentAt = -Infinity;
     this.scheduled = this.held = 0;
+    this.resetDue = false;
     this.ended = new AbortController();
     this.listen();
     this.showState();
@@ -209,7 +210,7 @@ class View {
     this.answered = true;
     this.failed = false;
     this.clearNote("passing", "drawing");
-    if (!this.state.camera) this.state.camera = head.camera;
+    if (!this.state.camera && !this.resetDue) this.state.camera = head.camera;
     const rest = head.stage === "whole" || head.stage === "lossless";
     this.progress(rest ? 100 : head.percent ?? 50);
     this.time.came(rest);
@@ -274,6 +275,7 @@ class View {
 
   sendWish() {
     delete this.host.dataset.pending;
+    this.resetDue = false;
     const { width, height } = this.picture.getBoundingClientRect();
     if (!(width >= 1 && height >= 1)) return; // hidden: the observer pushes when it is not
     const ratio = Math.min(devicePixelRatio, MAX_PIXEL_RATIO);
@@ -304,6 +306,7 @@ class View {
   /** Changes the state, shows it, wishes for it. */
   change(changes) {
     Object.assign(this.state, changes);
+    if (changes.camera === null) this.resetDue = true; // pictures before have the camera before
     // A frame keeps an error or a time; what was given last counts.
     if (changes.time_budget) this.state.max_error = null;
     else if (changes.max_error) this.state.time_budget = null;
