@@ -1,6 +1,7 @@
 """Files of each format, written by its own library: voxels of unequal sides, spacing, origin."""
 
 import numpy as np
+import pytest
 from array_checks import ORIGIN, SPACING, make_voxels
 
 VOXELS = make_voxels("int16")
@@ -15,7 +16,7 @@ def even(axis, count):
 
 
 def tiff(path, voxels=VOXELS, **how):
-    import tifffile
+    tifffile = pytest.importorskip("tifffile")
 
     how.setdefault("photometric", "minisblack")
     tifffile.imwrite(path, voxels, **how)
@@ -42,7 +43,7 @@ def tiff_folder(path):
 
 
 def netcdf(path, names=("z", "y", "x"), voxels=None, format="NETCDF4"):
-    import netCDF4
+    netCDF4 = pytest.importorskip("netCDF4")
 
     voxels = VOXELS if voxels is None else voxels
     with netCDF4.Dataset(path, "w", format=format) as file:
@@ -59,7 +60,7 @@ def classic_netcdf(path):
 
 
 def hdf5(path):
-    import h5py
+    h5py = pytest.importorskip("h5py")
 
     with h5py.File(path, "w") as file:
         ct = file.create_dataset("scan/ct", data=VOXELS, chunks=(2, 2, 2), compression="gzip")
@@ -69,7 +70,7 @@ def hdf5(path):
 
 def scaled_hdf5(path):
     """With axes x, z, y, which dimension scales name."""
-    import h5py
+    h5py = pytest.importorskip("h5py")
 
     with h5py.File(path, "w") as file:
         file["ct"] = VOXELS.transpose(2, 0, 1)
@@ -81,7 +82,7 @@ def scaled_hdf5(path):
 
 def ome_zarr(path, voxels=None, further=()):
     """Two levels of detail."""
-    import zarr
+    zarr = pytest.importorskip("zarr")
 
     voxels = VOXELS if voxels is None else voxels
     axes = [{"name": name} for name in further]
@@ -103,14 +104,14 @@ def ome_zarr(path, voxels=None, further=()):
 
 
 def zarr_array(path):
-    import zarr
+    zarr = pytest.importorskip("zarr")
 
     zarr.save(path, VOXELS)
 
 
 def xarray_zarr(path):
     """By xarray, with axes y, x, z."""
-    import xarray
+    xarray = pytest.importorskip("xarray")
 
     coordinates = {name: even("zyx".index(name), VOXELS.shape["zyx".index(name)]) for name in "zyx"}
     array = xarray.DataArray(VOXELS.transpose(1, 2, 0), coordinates, dims=("y", "x", "z"))
@@ -126,7 +127,7 @@ def npz(path):
 
 
 def mrc(path, voxels=VOXELS, compression=None):
-    import mrcfile
+    mrcfile = pytest.importorskip("mrcfile")
 
     with mrcfile.new(path, compression=compression) as file:
         file.set_data(voxels)
@@ -140,7 +141,7 @@ def packed_mrc(path):
 
 def turned_mrc(path):
     """Columns along z, rows along x, sections along y; without an origin, but with a start."""
-    import mrcfile
+    mrcfile = pytest.importorskip("mrcfile")
 
     mrc(path, VOXELS.transpose(1, 2, 0))
     with mrcfile.open(path, "r+") as file:
@@ -153,8 +154,8 @@ def turned_mrc(path):
 
 def vtk_image(cells=False):
     """Voxels at points, or at the middles of cells; its extent does not begin at 0."""
-    import vtk
-    from vtk.util.numpy_support import numpy_to_vtk
+    vtk = pytest.importorskip("vtk")
+    numpy_to_vtk = pytest.importorskip("vtk.util.numpy_support").numpy_to_vtk
 
     first = (2, -3, 4)  # x, y, z
     image = vtk.vtkImageData()
@@ -173,7 +174,7 @@ def vtk_image(cells=False):
 
 
 def vti(path, cells=False, mode="Appended"):
-    import vtk
+    vtk = pytest.importorskip("vtk")
 
     writer = vtk.vtkXMLImageDataWriter()
     writer.SetInputData(vtk_image(cells))
@@ -187,7 +188,7 @@ def vti_of_cells(path):
 
 
 def legacy_vtk(path):
-    import vtk
+    vtk = pytest.importorskip("vtk")
 
     writer = vtk.vtkStructuredPointsWriter()
     writer.SetInputData(vtk_image())
@@ -198,7 +199,7 @@ def legacy_vtk(path):
 
 def nifti2(path, voxels=VOXELS, kind="Nifti2Image"):
     """In nibabel's RAS, whose axes x and y are opposite to ours."""
-    import nibabel
+    nibabel = pytest.importorskip("nibabel")
 
     affine = np.diag([-SPACING[2], -SPACING[1], SPACING[0], 1.0])
     affine[:3, 3] = -ORIGIN[2], -ORIGIN[1], ORIGIN[0]

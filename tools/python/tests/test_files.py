@@ -79,7 +79,7 @@ def test_pictures_are_no_volumes(tmp_path):
 
 
 def test_images_and_units_of_ome_tiff(tmp_path):
-    import tifffile
+    tifffile = pytest.importorskip("tifffile")
 
     path = tmp_path / "a.ome.tif"
     nanometres = {"PhysicalSizeZ": 3000.0, "PhysicalSizeZUnit": "nm"}
@@ -129,7 +129,7 @@ def test_levels_of_ome_zarr(tmp_path):
 
 
 def test_datasets_are_chosen_by_name(tmp_path):
-    import h5py
+    h5py = pytest.importorskip("h5py")
 
     np.savez(tmp_path / "a.npz", one=VOXELS, two=VOXELS + 1, flat=np.zeros((2, 2)))
     with h5py.File(tmp_path / "a.h5", "w") as file:
@@ -149,7 +149,7 @@ def test_datasets_are_chosen_by_name(tmp_path):
 
 
 def test_voxels_without_data_are_those_of_the_file(tmp_path):
-    import h5py
+    h5py = pytest.importorskip("h5py")
 
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["ct"] = VOXELS
@@ -160,7 +160,7 @@ def test_voxels_without_data_are_those_of_the_file(tmp_path):
 
 
 def test_coordinates_that_are_not_even_need_a_spacing(tmp_path):
-    import netCDF4
+    netCDF4 = pytest.importorskip("netCDF4")
 
     write.netcdf(tmp_path / "a.nc")
     with netCDF4.Dataset(tmp_path / "a.nc", "a") as file:
@@ -175,7 +175,7 @@ def test_layers_are_read_when_they_are_needed(tmp_path):
     write.tiff(tmp_path / "a.tif", VOXELS, compression="zlib")
     write.tiff_folder(tmp_path / "layers")
     write.vti(tmp_path / "a.vti")
-    import tifffile
+    tifffile = pytest.importorskip("tifffile")
 
     with tifffile.TiffFile(tmp_path / "a.tif") as file:
         at = file.pages[-1].dataoffsets[0]

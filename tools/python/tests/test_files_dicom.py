@@ -3,15 +3,16 @@
 import random
 
 import numpy as np
-import pydicom
 import pytest
 from array_checks import check_source, make_direction, make_voxels, read_all
-from pydicom.dataset import Dataset, FileMetaDataset
-from pydicom.uid import CTImageStorage, EnhancedCTImageStorage, ExplicitVRLittleEndian, generate_uid
 
 import isowave
 from isowave._arrays import as_source
 from isowave._files import source_of_file, steps_of_file
+
+pydicom = pytest.importorskip("pydicom")
+Dataset, FileMetaDataset = pydicom.Dataset, pydicom.dataset.FileMetaDataset
+generate_uid = pydicom.uid.generate_uid
 
 VOXELS = make_voxels("int16")
 SPACING = (3.0, 0.5, 2.0)  # z, y, x
@@ -23,10 +24,10 @@ def decimals(values):
     return [pydicom.valuerep.DSfloat(float(v), auto_format=True) for v in values]
 
 
-def header(storage=CTImageStorage, **more):
+def header(storage=pydicom.uid.CTImageStorage, **more):
     image = Dataset()
     image.file_meta = FileMetaDataset()
-    image.file_meta.TransferSyntaxUID = ExplicitVRLittleEndian
+    image.file_meta.TransferSyntaxUID = pydicom.uid.ExplicitVRLittleEndian
     image.SOPClassUID = image.file_meta.MediaStorageSOPClassUID = storage
     image.SOPInstanceUID = image.file_meta.MediaStorageSOPInstanceUID = generate_uid()
     image.SeriesInstanceUID, image.StudyInstanceUID = SERIES, generate_uid()
@@ -151,7 +152,7 @@ def test_images_at_the_same_positions_are_steps(tmp_path):
 
 
 def test_frames_of_one_file(tmp_path):
-    image = header(EnhancedCTImageStorage, NumberOfFrames=len(VOXELS))
+    image = header(pydicom.uid.EnhancedCTImageStorage, NumberOfFrames=len(VOXELS))
     del image.RescaleSlope, image.RescaleIntercept
     shared, frames = Dataset(), []
     measures, rescale = Dataset(), Dataset()

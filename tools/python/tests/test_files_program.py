@@ -126,7 +126,7 @@ def test_the_program_reads_files_of_packages(folder):
 
 
 def test_the_program_gets_the_value_of_voxels_without_data(folder):
-    import h5py
+    h5py = pytest.importorskip("h5py")
 
     with h5py.File(folder / "a.h5", "w") as file:
         file["ct"] = VOXELS
