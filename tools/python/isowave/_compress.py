@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import sys
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
@@ -14,6 +15,13 @@ import numpy.typing as npt
 from isowave import _core
 from isowave._arrays import ArraySource, as_source
 from isowave._checked import flag, number, reversed_axes, whole
+from isowave._files import (
+    Index,
+    errors_with,
+    is_read_by_packages,
+    parse_index,
+    source_of_file,
+)
 from isowave._volume import Volume, warn_of_file
 
 #: Called with a step's name ("compressing") and how much of the step is done, 0 to 1.
@@ -221,6 +229,8 @@ def open(  # noqa: A001: as gzip.open, h5py.File's habit
     shape: Sequence[int] | None = None,
     dtype: npt.DTypeLike | None = None,
     spacing: Sequence[float] | None = None,
+    dataset: str | None = None,
+    index: Index | None = None,
     levels: int = 1,
     map_nan: float | None = None,
     no_data: float | None = None,
@@ -232,9 +242,20 @@ def open(  # noqa: A001: as gzip.open, h5py.File's habit
     A ``.zfp`` file is read when it is needed; it must not change. Other volumes are compressed into
     memory, with the options of compress(): ``.raw`` and ``.raw.gz`` (named ``NAME_XxYxZ_TYPE.raw``,
     or with shape (z, y, x) and dtype), ``.nrrd``, ``.nhdr``, ``.mha``, ``.mhd``, ``.nii``,
-    ``.nii.gz``, and ``generate:FIELD_XxYxZ_TYPE``.
+    ``.nii.gz``, and ``generate:FIELD_XxYxZ_TYPE``. With the packages of ``isowave[files]``: TIFF
+    (OME-TIFF, ImageJ's, a folder of layers), folders of DICOM, HDF5, NetCDF, zarr and OME-Zarr,
+    NPY, NPZ, MRC, VTK's ImageData (``.vti``, ``.vtk``) and NIfTI-2; most are read layer by layer.
 
-    spacing, (z, y, x), replaces the file's spacing.
+    Parameters
+    ----------
+    spacing
+        (z, y, x), replaces the file's spacing.
+    dataset
+        Name of an array in a file that has several: a dataset or variable, an array of points or
+        cells, a level of OME-Zarr, the number of a TIFF's image, the number, UID or description of
+        a DICOM series.
+    index
+        Entries of axes beside z, y and x, counted from 0: "t=3,c=0" or {"t": 3, "c": 0}.
 
     Raises
     ------
@@ -248,6 +269,14 @@ def open(  # noqa: A001: as gzip.open, h5py.File's habit
     )
     if is_compressed:
         options["measure_error"] = False
+    if is_read_by_packages(name):
+        if shape is not None or dtype is not None:
+            raise _core.Error(f"{name}: shape and dtype are for raw files; this file has its own")
+        return open_source(name, source_of_file(name, dataset, index, spacing), options, progress)
+    if dataset is not None:
+        raise _core.Error(f"{name}: dataset {dataset}: this file has one array, without a name")
+    if index is not None:
+        return open_step(name, index, options, spacing)
     with shown(progress) as told:
         core = _core.open(
             name,
@@ -261,3 +290,34 @@ def open(  # noqa: A001: as gzip.open, h5py.File's habit
     if not is_compressed:
         return Volume(core)
     return Volume(core, os.path.abspath(name), None if spacing is None else tuple(spacing))
+
+
+def open_source(
+    name: str, source: ArraySource, options: dict[str, Any], progress: bool | Progress | None
+) -> Volume:
+    """Compresses a file's volume. Errors of its reader are isowave.Errors."""
+    if options["no_data"] is None:
+        options = {**options, "no_data": source.no_data}
+    with shown(progress) as told, errors_with(name):
+        return Volume(compressed(None, source, options, None, told))
+
+
+def step_of(name: str, index: Index, count: int) -> int:
+    """The step that an index asks for of a file that the compiled part reads. Raises Error."""
+    with errors_with(name):
+        found = parse_index(index)
+        if [*found] != ["t"] or found["t"] >= count:
+            raise ValueError(f"index {index}: its further axes are t ({count} entries)")
+        return found["t"]
+
+
+def open_step(
+    name: str, index: Index, options: dict[str, Any], spacing: Sequence[float] | None
+) -> Volume:
+    """A step of a NIfTI or NRRD file."""
+    series = _core.open_series(
+        [name], options, None, None, None if spacing is None else reversed_axes(spacing)
+    )
+    for notice in series.notices:
+        warnings.warn(notice, RuntimeWarning, stacklevel=3)
+    return Volume(series.open(step_of(name, index, series.size)))

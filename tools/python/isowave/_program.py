@@ -1,4 +1,7 @@
-"""The command `isowave`: `view` is Python's, everything else the program in the wheel."""
+"""The command `isowave`: `view` is Python's, everything else the program in the wheel.
+
+Files that the program cannot read, and packages of Python can, it gets as NRRD.
+"""
 
 from __future__ import annotations
 
@@ -6,12 +9,23 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
+from collections.abc import Sequence
+from typing import Any
 
 from isowave import _loader
+from isowave._core import Error
+from isowave._given_files import given_files, with_nrrd
 from isowave.viewer import command
 
 PROGRAM = _loader.PACKAGE / "bin" / "isowave"
 VIEW = "  view                        Show a volume in a browser: isowave view --help"
+FILES = """
+With pip install 'isowave[files]', info, convert, render, extract and view read TIFF, folders of
+DICOM, HDF5, NetCDF, zarr, NPY, NPZ, MRC, VTI, VTK and NIfTI-2, too:
+  --dataset NAME              which array of a file that has several, or which level
+  --index AXIS=N,...          entries of further axes, counted from 0: t=3,c=0
+"""
 
 
 def main() -> int:
@@ -24,7 +38,33 @@ def main() -> int:
         os.environ["LD_LIBRARY_PATH"] = ":".join(filter(None, folders))
     if arguments in (["-h"], ["--help"]):
         help_text = subprocess.run([PROGRAM, "--help"], stdout=subprocess.PIPE, text=True).stdout
-        print(help_text.replace("\n\nExit status:", f"\n{VIEW}\n\nExit status:"), end="")
+        own = f"\n{VIEW}\n{FILES}\nExit status:"
+        print(help_text.replace("\n\nExit status:", own), end="")
         return 0
+    files = given_files(arguments)
+    if files:
+        return run_with_nrrd(arguments, files)
     signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # Python ignores it, which a program inherits
     os.execv(PROGRAM, ["isowave", *arguments])
+
+
+def run_with_nrrd(arguments: Sequence[str], files: Sequence[str]) -> int:
+    """Runs the program with NRRD files in place of these. Returns its exit status."""
+
+    def stop(*_: Any) -> None:
+        sys.exit(128 + signal.SIGTERM)  # by way of the folder's end
+
+    signal.signal(signal.SIGTERM, stop)
+    try:
+        with tempfile.TemporaryDirectory(prefix="isowave-") as folder:
+            changed = with_nrrd(arguments, files, folder)
+            with subprocess.Popen([PROGRAM, *changed]) as process:
+                signal.signal(signal.SIGINT, lambda *_: None)  # Ctrl-C ends the program, too
+                signal.signal(signal.SIGTERM, lambda *_: process.terminate())
+                status = process.wait()
+    except (Error, OSError) as error:
+        print(f"isowave: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 130
+    return status if status >= 0 else 128 - status

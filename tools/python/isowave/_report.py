@@ -10,7 +10,11 @@ from typing import Any
 
 from isowave import _core, _loader
 
-PACKAGES = ("numpy", "pocl-binary-distribution", "pillow", "simplejpeg", "websockets", "anywidget")
+PACKAGES = (
+    *("numpy", "pocl-binary-distribution", "pillow", "simplejpeg", "websockets", "anywidget"),
+    *("h5py", "imagecodecs", "mrcfile", "netCDF4", "nibabel", "pydicom", "tifffile", "vtk"),
+    *("xarray", "zarr"),
+)
 VARIABLES = ("ISOWAVE_DEVICE", "OCL_ICD_VENDORS", "OCL_ICD_FILENAMES", "POCL_CACHE_DIR")
 
 

@@ -102,7 +102,7 @@ def open_field(name: str, options: dict[str, Any]) -> Volume:
     """Opens a second volume beside one that is opened with these options."""
     if name.endswith(".zfp"):  # compressed already
         return open_volume(name)
-    own = ("shape", "dtype", "spacing")  # of the volume's file alone
+    own = ("shape", "dtype", "spacing", "dataset", "index")  # of the volume's file alone
     return open_volume(name, **{key: each for key, each in options.items() if key not in own})
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 import os
 import threading
 import warnings
@@ -15,7 +16,15 @@ import numpy.typing as npt
 from isowave import _core
 from isowave._camera import Camera
 from isowave._checked import Isovalue, refuse, reversed_axes
-from isowave._compress import compress, compression_options, dims_of
+from isowave._compress import compress, compression_options, dims_of, open_source, step_of
+from isowave._files import (
+    Index,
+    is_read_by_packages,
+    natural_order,
+    parse_index,
+    source_of_file,
+    steps_of_file,
+)
 from isowave._image import Image
 from isowave._request import isovalue_or_surfaces
 from isowave._surface import Surface
@@ -102,6 +111,8 @@ def open_series(
     shape: Sequence[int] | None = None,
     dtype: npt.DTypeLike | None = None,
     spacing: Sequence[float] | None = None,
+    dataset: str | None = None,
+    index: Index | None = None,
     levels: int = 1,
     map_nan: float | None = None,
     no_data: float | None = None,
@@ -114,11 +125,11 @@ def open_series(
     ----------
     source
         A pattern of files, as in a shell (*, ?, [a-z]), taken in natural order: step_2 before
-        step_10. Or a NIfTI or NRRD file with a fourth axis, a list of paths, or an array with the
+        step_10. Or a file with an axis t beside z, y and x, a list of paths, or an array with the
         axes (t, z, y, x), whose parts array[t] compress() takes.
     tolerance, relative_tolerance, rate, exact, levels, map_nan, no_data, num_threads
         As compress() has them, for each step.
-    shape, dtype, spacing
+    shape, dtype, spacing, dataset, index
         As open() has them, for files.
     origin, direction, fill_value, spacing
         As compress() has them, for arrays.
@@ -136,7 +147,15 @@ def open_series(
         paths = [os.fsdecode(path) for path in ([source] if is_path(source) else source)]
         if paths and all(path.endswith(".zfp") for path in paths):
             checked["measure_error"] = False
-        return of_files(
+        if any(map(is_read_by_packages, paths)):
+            if shape is not None or dtype is not None:
+                raise _core.Error(
+                    f"{paths[0]}: shape and dtype are for raw files; this has its own"
+                )
+            return of_read_files(paths, dataset, index, spacing, checked)
+        if dataset is not None:
+            raise _core.Error(f"{paths[0]}: dataset {dataset}: this file has one array")
+        series = of_files(
             _core.open_series(
                 paths,
                 checked,
@@ -145,8 +164,12 @@ def open_series(
                 None if spacing is None else reversed_axes(spacing),
             )
         )
-    if shape is not None or dtype is not None:
-        raise TypeError("shape and dtype are for files: the array has its own")
+        if index is None:
+            return series
+        step = step_of(paths[0], index, len(series))
+        return series[step : step + 1]
+    if any(given is not None for given in (shape, dtype, dataset, index)):
+        raise TypeError("shape, dtype, dataset and index are for files: the array has its own")
     if len(getattr(source, "shape", ())) != 4:
         raise refuse("source", source, "a pattern, a list of paths or an array (t, z, y, x)")
     names = (*("tolerance", "relative_tolerance", "rate", "exact"), "levels", "map_nan", "no_data")
@@ -172,3 +195,46 @@ def of_files(core: _core.Series) -> Series:
             return Volume(core.open(step))
 
     return Series([core.name(i) for i in range(core.size)], load)
+
+
+def of_read_files(
+    paths: Sequence[str],
+    dataset: str | None,
+    index: Index | None,
+    spacing: Sequence[float] | None,
+    options: dict[str, Any],
+) -> Series:
+    """Steps that packages of Python read: files, or the entries of one file's axis t."""
+    files = [file for path in paths for file in matching(path)]
+    steps = [(file, file, index) for file in files]
+    along = steps_of_file(files[0], dataset, index)
+    if along is not None and len(files) == 1:
+        axis, count = along
+        fixed = parse_index(index)
+        steps = [(f"{files[0]}, step {i}", files[0], {**fixed, axis: i}) for i in range(count)]
+
+    def grid(file: str, entries: Index | None) -> tuple[Any, ...]:
+        source = source_of_file(file, dataset, entries, spacing)
+        return (source.shape, source.spacing, source.origin, source.direction.tolist())
+
+    first = grid(files[0], steps[0][2])
+    for file in files[1:]:
+        if grid(file, index) != first:
+            raise _core.Error(f"{file}: it has another grid than {files[0]}")
+
+    def load(step: int) -> Volume:
+        _, file, entries = steps[step]
+        source = source_of_file(file, dataset, entries, spacing)
+        return open_source(file, source, options, progress=False)
+
+    return Series([name for name, _, _ in steps], load)
+
+
+def matching(path: str) -> list[str]:
+    """The files of a pattern, in natural order; other paths as they are. Raises Error if none."""
+    if os.path.exists(path) or not glob.has_magic(path):
+        return [path]
+    found = sorted(glob.glob(path), key=natural_order)
+    if not found:
+        raise _core.Error(f"{path}: no file has such a name")
+    return found

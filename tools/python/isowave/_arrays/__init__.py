@@ -7,7 +7,7 @@
 | module | what is in it |
 |---|---|
 | source | as_source(), ArraySource, which class has which adapter |
-| memory, stores, labelled, images, nifti | the adapters |
+| memory, stores, ome_zarr, labelled, images, nifti | the adapters |
 | found | an adapter's description of an array |
 | grid | spacing, origin, direction; the rules of core/volume |
 | voxels | stored types -> types that isowave reads |
@@ -16,6 +16,6 @@
 """
 
 from .errors import ArrayTypeError, ArrayValueError
-from .source import ArraySource, as_source
+from .source import ArraySource, as_source, source_of
 
-__all__ = ["ArraySource", "ArrayTypeError", "ArrayValueError", "as_source"]
+__all__ = ["ArraySource", "ArrayTypeError", "ArrayValueError", "as_source", "source_of"]

@@ -65,7 +65,7 @@ def vtk_image(image: Any, has_spacing: bool) -> Found:
             "image.set_active_scalars('name')",
         )
     _need_scalars(scalars.GetNumberOfComponents(), what)
-    voxels = _vtk_voxels(scalars, what)
+    voxels = vtk_voxels(scalars, what)
     if voxels.shape != (nx * ny * nz,):
         raise bad_value(what, f"{voxels.size} scalars for {nz} x {ny} x {nx} points")
     directions = image.GetDirectionMatrix()
@@ -88,7 +88,7 @@ def vtk_dataset(dataset: Any, has_spacing: bool) -> Found:
     )
 
 
-def _vtk_voxels(scalars: Any, what: str) -> Any:
+def vtk_voxels(scalars: Any, what: str) -> Any:
     """Returns a vtkDataArray's memory as a numpy array."""
     vtk_bit, vtk_char = 1, 2
     kind = int(scalars.GetDataType())

@@ -16,7 +16,7 @@ from .stores import uneven_rows
 
 _EVEN_TOLERANCE = 1e-2
 """How far, in steps, a coordinate may be from an even one: files round to float32 or decimals."""
-_AXES = {
+AXES = {
     "z": "z",
     "depth": "z",
     "height": "z",
@@ -70,9 +70,7 @@ def xarray_dataarray(array: Any, has_spacing: bool) -> Found:
         if dim not in array.coords:
             continue
         try:
-            steps[axis], origin[axis] = _even_steps(
-                array.coords[dim].values, shape[axis], dim, what
-            )
+            steps[axis], origin[axis] = even_steps(array.coords[dim].values, shape[axis], dim, what)
         except ValueError:
             if not has_spacing:
                 raise
@@ -97,7 +95,7 @@ def _order(array: Any, dims: tuple[Any, ...], what: str) -> tuple[int, int, int]
         return None  # checked_shape() refuses it
     named_axes: dict[str, int] = {}
     for index, dim in enumerate(dims):
-        axis = _axis(array, dim)
+        axis = axis_of(array, dim)
         if axis is None:
             continue
         if axis in named_axes:
@@ -108,17 +106,17 @@ def _order(array: Any, dims: tuple[Any, ...], what: str) -> tuple[int, int, int]
     return None if (z, y, x) == (0, 1, 2) else (z, y, x)
 
 
-def _axis(array: Any, dim: Any) -> str | None:
+def axis_of(array: Any, dim: Any) -> str | None:
     """Returns which of z, y and x a dimension is, if it says so."""
     if dim in array.coords:
         attributes = getattr(array.coords[dim], "attrs", None)
         said = attributes.get("axis") if isinstance(attributes, Mapping) else None
         if isinstance(said, str) and said in ("X", "Y", "Z"):
             return said.lower()
-    return _AXES.get(dim.lower()) if isinstance(dim, str) else None
+    return AXES.get(dim.lower()) if isinstance(dim, str) else None
 
 
-def _even_steps(values: Any, count: int, dim: Any, what: str) -> tuple[float, float]:
+def even_steps(values: Any, count: int, dim: Any, what: str) -> tuple[float, float]:
     """Returns the step, negative if coordinates fall, and the first coordinate.
 
     Raises ArrayValueError, with the dimension's name, if there is no such step.

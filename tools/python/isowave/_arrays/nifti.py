@@ -32,12 +32,17 @@ def nibabel_image(image: Any, has_spacing: bool) -> Found:
             f"shape {short(sizes)}: need one volume (x, y, z): take it, for example with "
             f"image.slicer[..., {', '.join(['0'] * (len(sizes) - 3))}]",
         )
-    shape = checked_shape(sizes[:3][::-1], what)
+    return nibabel_volume(image, (0,) * (len(sizes) - 3))
+
+
+def nibabel_volume(image: Any, further: tuple[int, ...]) -> Found:
+    """Returns the volume at an index of the axes after x, y and z."""
+    what = type_name(image)
+    shape = checked_shape(tuple(image.shape)[:3][::-1], what)
     data = image.dataobj
-    surplus = (0,) * (len(sizes) - 3)
 
     def fetch(begin: int, end: int) -> Any:
-        index = (slice(None), slice(None), slice(begin, end), *surplus)
+        index = (slice(None), slice(None), slice(begin, end), *further)
         layers = data[index]
         # A masked array must stay one.
         return (layers if isinstance(layers, np.ndarray) else np.asarray(layers)).T

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import images, labelled, memory, nifti, stores
+from . import images, labelled, memory, nifti, ome_zarr, stores
 from .errors import ArrayTypeError, ArrayValueError, bad_type, bad_value, one_line, type_name
-from .found import Adapter
+from .found import Adapter, Found
 from .grid import (
     check_placement,
     checked_direction,
@@ -82,7 +82,7 @@ _ADAPTERS: dict[tuple[str, str], Adapter] = {
     ("xarray", "DataTree"): stores.group,
     ("dask", "Array"): stores.dask_array,
     ("zarr", "Array"): stores.zarr_array,
-    ("zarr", "Group"): stores.zarr_group,
+    ("zarr", "Group"): ome_zarr.zarr_group,
     ("h5py", "Dataset"): stores.h5py_dataset,
     ("h5py", "Group"): stores.group,
     ("tensorstore", "TensorStore"): stores.tensorstore_store,
@@ -123,7 +123,10 @@ def as_source(
     """
     what = type_name(obj)
     try:
-        return _source(obj, what, spacing, origin, direction, fill_value)
+        found = _adapter(obj)(obj, spacing is not None)
+        return source_of(
+            found, spacing=spacing, origin=origin, direction=direction, fill_value=fill_value
+        )
     except (ArrayValueError, ArrayTypeError, MemoryError):
         raise
     except TypeError as error:
@@ -142,10 +145,18 @@ def _adapter(obj: Any) -> Adapter:
     return memory.from_memory
 
 
-def _source(
-    obj: Any, what: str, spacing: Any, origin: Any, direction: Any, fill_value: Any
+def source_of(
+    found: Found,
+    *,
+    spacing: Any = None,
+    origin: Any = None,
+    direction: Any = None,
+    fill_value: Any = None,
 ) -> ArraySource:
-    found = _adapter(obj)(obj, spacing is not None)
+    """Returns the source of what an adapter found; the other arguments are those of as_source().
+
+    Raises ArrayValueError, ArrayTypeError.
+    """
     what = found.what
     dtype = read_type(found.stored, what)
     fill = None if fill_value is None else checked_fill(fill_value, dtype, what)

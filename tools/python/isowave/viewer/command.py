@@ -86,9 +86,9 @@ def make_parser() -> argparse.ArgumentParser:
     add(
         "volume",
         nargs="*",
-        help="file of any format that isowave reads, or generate:... [that of --scene]. Several "
-        "files, a quoted pattern (step_*.nrrd), or a NIfTI or NRRD file with a fourth axis are the "
-        "steps of a series",
+        help="file or folder of any format that isowave reads, or generate:... [that of --scene]. "
+        "Several files, a quoted pattern (step_*.nrrd), or a file with an axis t are the steps of "
+        "a series",
     )
     add(
         "-i",
@@ -128,6 +128,8 @@ def make_parser() -> argparse.ArgumentParser:
     add("--type", help="voxel type of a raw file: uint8, int8, ... float32, float64")
     add("--spacing", type=float, nargs="+", help="world units between voxels: X Y Z, or one")
     add("--no-data", type=float, help="value of voxels without data, beside NaN")
+    add("--dataset", metavar="NAME", help="which array of a file that has several, or which level")
+    add("--index", metavar="AXIS=N,...", help="entries of further axes, counted from 0: t=3,c=0")
     add("--host", default="127.0.0.1", help="address to listen at; traffic is not encrypted")
     add("--port", type=int, default=0, help="port to listen at; 0: a free one")
     add("--max-clients", type=int, default=16, help="most clients at the same time")
@@ -232,6 +234,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             "shape": reversed_axes("--dims", arguments.dims),
             "dtype": arguments.type,
             "spacing": reversed_axes("--spacing", arguments.spacing),
+            "dataset": arguments.dataset,
+            "index": arguments.index,
         }
         fields = scene_of(arguments)
         given = {key: value for key, value in given.items() if value is not None}

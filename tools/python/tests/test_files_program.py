@@ -1,0 +1,215 @@
+"""Files that packages of Python read, in series, in `isowave view` and for the program."""
+
+import json
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+
+import file_writers as write
+import numpy as np
+import pytest
+from file_writers import ORIGIN, SPACING, STEPS, VOXELS
+from test_series import nrrd
+
+import isowave
+from isowave import _program
+from isowave._arrays import as_source
+from isowave._given_files import given_files, take_option, write_nrrd
+from isowave.viewer.command import make_parser, series_of
+
+
+def command(*arguments, **more):
+    """Runs the command that the wheel installs."""
+    path = os.path.join(os.path.dirname(sys.executable), "isowave")
+    return subprocess.run(
+        [path, *map(str, arguments)], capture_output=True, text=True, check=False, **more
+    )
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """Where temporary files go; empty at the end."""
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    monkeypatch.setenv("TMPDIR", str(temporary))
+    yield tmp_path
+    assert [*temporary.iterdir()] == []
+
+
+# series -----------------------------------------------------------------------------------------
+
+
+def test_series_of_files(tmp_path):
+    for t in (2, 10, 1):
+        write.ome_tiff(tmp_path / f"s_{t}.ome.tif", VOXELS + t)
+    for given in (tmp_path / "s_*.tif", [tmp_path / f"s_{t}.ome.tif" for t in (1, 2, 10)]):
+        series = isowave.open_series(given, tolerance=0.25)
+        assert [pathlib.Path(name).name for name in series.names] == [
+            "s_1.ome.tif",
+            "s_2.ome.tif",
+            "s_10.ome.tif",
+        ]
+        assert [round(float(v[6, 4, 2])) for v in series] == [
+            VOXELS[6, 4, 2] + t for t in (1, 2, 10)
+        ]
+        assert series[0].spacing == SPACING
+    write.ome_tiff(tmp_path / "s_11.ome.tif", VOXELS[:, :4])
+    with pytest.raises(isowave.Error, match="s_11.ome.tif: it has another grid than .*s_1.ome.tif"):
+        isowave.open_series(tmp_path / "s_*.tif")
+    with pytest.raises(isowave.Error, match="no file has such a name"):
+        isowave.open_series(tmp_path / "q_*.tif")
+
+
+def test_series_of_one_file(tmp_path):
+    write.ome_tiff(tmp_path / "a.ome.tif", np.stack([STEPS, STEPS + 5], 1), "TCZYX")
+    series = isowave.open_series(tmp_path / "a.ome.tif", index="c=1")
+    assert series.names[2].endswith("a.ome.tif, step 2")
+    assert [np.array_equal(v[...], s + 5) for v, s in zip(series, STEPS, strict=True)] == [True] * 3
+    assert len(isowave.open_series(tmp_path / "a.ome.tif", index="c=1,t=2")) == 1
+
+
+@pytest.mark.parametrize("name", ["a.nrrd", "a.nii.gz"])
+def test_index_of_what_the_compiled_part_reads(tmp_path, name):
+    steps = (STEPS + 100).astype("uint8")
+    if name == "a.nrrd":
+        nrrd(tmp_path / name, steps)
+    else:
+        write.nifti2(tmp_path / name, steps, "Nifti1Image")
+    assert np.array_equal(isowave.open(tmp_path / name, index="t=1")[...], steps[1])
+    series = isowave.open_series(tmp_path / name, index={"t": 2})
+    assert len(series) == 1 and np.array_equal(series[0][...], steps[2])
+    for index in ("t=3", "c=0", "t=0,c=0"):
+        for opener in (isowave.open, isowave.open_series):
+            with pytest.raises(isowave.Error, match=r"its further axes are t \(3 entries\)"):
+                opener(tmp_path / name, index=index)
+    with pytest.raises(isowave.Error, match="dataset ct: this file has one array"):
+        isowave.open(tmp_path / name, dataset="ct", index="t=1")
+
+
+def test_arrays_have_no_dataset_or_index():
+    for option in ("dataset", "index"):
+        with pytest.raises(TypeError, match="are for files"):
+            isowave.open_series(STEPS, **{option: "t=1"})
+
+
+# isowave view -----------------------------------------------------------------------------------
+
+
+def test_view_takes_files_and_folders(tmp_path):
+    parsed = make_parser().parse_args(["a.h5", "--dataset", "s/ct", "--index", "t=3,c=0"])
+    assert (parsed.dataset, parsed.index) == ("s/ct", "t=3,c=0")
+    write.tiff_folder(tmp_path / "layers")
+    assert series_of([str(tmp_path / "layers")], {}) is None
+    write.ome_tiff(tmp_path / "a.ome.tif", STEPS, "TZYX")
+    assert len(series_of([str(tmp_path / "a.ome.tif")], {})) == 3
+    assert series_of([str(tmp_path / "a.ome.tif")], {"index": "t=1"}) is None
+
+
+# the program ------------------------------------------------------------------------------------
+
+
+def test_the_program_reads_files_of_packages(folder):
+    write.ome_zarr(folder / "a.zarr", STEPS, ("c",))
+    more = ("--dataset", "0", "--index=c=2")
+    done = command("info", "--json", folder / "a.zarr", *more)
+    assert done.returncode == 0, done.stderr
+    info = json.loads(done.stdout)
+    assert info["dims"] == [*VOXELS.shape[::-1]] and info["type"] == "int16"
+    assert info["spacing"] == pytest.approx(SPACING[::-1])
+    assert info["origin"] == pytest.approx(ORIGIN[::-1])
+    out = folder / "out.zfp"
+    done = command("convert", *more, folder / "a.zarr", "--exact", "-o", out)
+    assert done.returncode == 0, done.stderr
+    assert np.array_equal(isowave.open(out)[...], STEPS[2])
+
+
+def test_the_program_gets_the_value_of_voxels_without_data(folder):
+    h5py = pytest.importorskip("h5py")
+
+    with h5py.File(folder / "a.h5", "w") as file:
+        file["ct"] = VOXELS
+        file["ct"].attrs["_FillValue"] = VOXELS[1, 2, 1]
+    for more, value in (((), VOXELS[1, 2, 1]), (("--no-data", VOXELS[2, 2, 1]), VOXELS[2, 2, 1])):
+        done = command("convert", folder / "a.h5", "-o", folder / "out.zfp", *more)
+        assert done.returncode == 0, done.stderr
+        assert np.array_equal(np.isnan(isowave.open(folder / "out.zfp")[...]), VOXELS == value)
+
+
+@pytest.mark.parametrize(
+    "arguments, text",
+    [
+        (["a.tif"], "a.tif: image 0: axis t has 3 entries: choose one by index, as t=0"),
+        (["a.tif", "--index", "t=1", "--nonsense"], "--nonsense"),
+        (["bad.tif"], "bad.tif: not a TIFF file"),
+    ],
+)
+def test_the_program_says_in_one_line_what_is_wrong(folder, arguments, text):
+    write.tiff(folder / "a.tif", STEPS, metadata={"axes": "TZYX"})
+    (folder / "bad.tif").write_text("nonsense")
+    done = command("info", *arguments, cwd=folder)
+    assert done.returncode == 1 and done.stdout == ""
+    assert done.stderr.startswith("isowave: ") and done.stderr.count("\n") == 1
+    assert text in done.stderr
+
+
+def test_signals_leave_no_file_behind(folder, monkeypatch):
+    """The program, here one that waits, ends with its parent's SIGTERM."""
+    write.npy(folder / "a.npy")
+    script = (
+        "import pathlib, sys\nfrom isowave import _program\n"
+        "_program.PROGRAM = pathlib.Path('/bin/sh')\n"
+        "_program.with_nrrd = lambda *_: ['-c', 'echo ready; exec sleep 600']\n"
+        "sys.argv[1:] = ['info', sys.argv[1]]\nsys.exit(_program.main())"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", script, folder / "a.npy"], stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout.readline() == "ready\n"
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(60) == 128 + signal.SIGTERM
+
+
+def test_which_arguments_are_files(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write.npy("a.npy")
+    write.tiff_folder(tmp_path / "layers")
+    for name in ("pictures", "a.nrrd", "b.tif"):
+        pathlib.Path(name).mkdir() if name == "pictures" else pathlib.Path(name).write_text("")
+    assert given_files(["render", "a.npy", "--depth", "a.npy"]) == ["a.npy"]
+    assert given_files(["render", "a.nrrd", "--depth", "a.npy", "--progress-dir", "pictures"]) == []
+    assert given_files(["render", "--exact", "layers", "--color-by", "b.tif"]) == [
+        "layers",
+        "b.tif",
+    ]
+    assert given_files(["compare", "a.npy", "a.npy"]) == given_files(["--help"]) == []
+    assert given_files(["render", "a.nrrd", "-i", "80", "missing.tif"]) == []
+    arguments = ["a", "--index", "t=1", "--x=y", "--dataset=q", "b"]
+    assert (take_option(arguments, "--index"), take_option(arguments, "--dataset")) == ("t=1", "q")
+    assert take_option(arguments, "--index") is None and arguments == ["a", "--x=y", "b"]
+    with pytest.raises(isowave.Error, match="--index: 1 required TEXT missing"):
+        take_option(["a", "--index"], "--index")
+
+
+@pytest.mark.parametrize(
+    "dtype", ["uint8", "int8", "uint16", "uint32", "float32", "float64", "int64"]
+)
+def test_nrrd_has_the_same_bits_and_place(tmp_path, dtype):
+    direction = np.array([[0, 0, -1.0], [0.6, 0.8, 0], [0.8, -0.6, 0]])
+    voxels = VOXELS.astype(dtype)
+    source = as_source(voxels, spacing=(0.1, 0.3, 1e-3), origin=ORIGIN, direction=direction)
+    write_nrrd(source, str(tmp_path / "a.nrrd"))
+    volume = isowave.open(tmp_path / "a.nrrd")
+    assert volume.source_dtype == ("float64" if dtype == "int64" else dtype)
+    assert np.array_equal(volume[...], voxels.astype("float32"))
+    np.testing.assert_allclose(volume.direction, direction, atol=1e-15)
+    assert volume.spacing == pytest.approx((0.1, 0.3, 1e-3), rel=1e-15) and volume.origin == ORIGIN
+
+
+def test_help_names_the_options(capsys, monkeypatch):
+    monkeypatch.setattr(sys, "argv", ["isowave", "--help"])
+    assert _program.main() == 0
+    shown = capsys.readouterr().out
+    for text in ("isowave[files]", "--dataset NAME", "--index AXIS=N", "\n\nExit status:"):
+        assert text in shown
