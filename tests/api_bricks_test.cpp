@@ -6,6 +6,7 @@
 
 #include <functional>
 #include <isowave/isowave.hpp>
+#include <memory>
 #include <thread>
 #include <utility>
 
@@ -108,6 +109,45 @@ TEST(ApiBricks, SurfacesOfOneRenderer) {
                 testing::HasSubstr("leave out on_pass"));
   });
   EXPECT_GT(expected.statistics.layers, 4u);
+}
+
+/// A field of which each process keeps what it needs, and labels with their own colours.
+TEST(ApiBricks, FieldsAndLabelsOfOneRenderer) {
+  const Compression exact{.exact = true};
+  const std::shared_ptr<const Volume> fuel = open_volume(kFuel, exact);
+  for (const bool draws_labels : {false, true}) {
+    FrameRequest request{.isovalue = 40, .size = {48, 32}, .want_field = true};
+    RendererOptions options{.largest = {48, 32}};
+    if (draws_labels) {
+      options.with_surfaces = 2;
+      options.with_labels = true;
+      request.want_field = false;
+      request.surfaces = {{.opacity = 0.4f, .labels = {20, 21, 22, 40}}, {.labels = {90, 91, 92}}};
+    }
+    request.appearance.color_by_field = true;
+    request.appearance.color_by_label = draws_labels;
+    request.appearance.color_map = draws_labels ? "labels" : "viridis";
+    RendererOptions of_one = options;
+    of_one.field = fuel;
+    Renderer whole(open_device(), fuel, of_one);
+    request.camera = draws_labels ? whole.camera(request.surfaces) : whole.camera(40);
+    const Frame expected = whole.render(request);
+    in_threads([&](Processes &processes, std::uint32_t rank) {
+      Renderer renderer =
+          make_team_renderer(processes, kFuel, exact, {}, {.field = kFuel, .renderer = options});
+      const Frame frame = renderer.render(request);
+      EXPECT_EQ(frame.statistics.field_range, expected.statistics.field_range);
+      EXPECT_EQ(frame.picture, rank == 0 ? expected.picture : std::vector<std::uint8_t>());
+      EXPECT_EQ(frame.field.size(), rank == 0 ? expected.field.size() : 0u);
+    });
+    EXPECT_GT(expected.statistics.hits, 50u);
+  }
+  in_threads([&](Processes &processes, std::uint32_t) {
+    EXPECT_THAT(core::test::error_of([&] {
+                  make_team_renderer(processes, kFuel, exact, {}, {.renderer = {.field = fuel}});
+                }),
+                testing::HasSubstr("a team's field is a file: give BrickOptions::field"));
+  });
 }
 
 /// Also of a volume whose error is known only when it is compressed, brick by brick.

@@ -197,14 +197,16 @@ TEST_F(CliRanks, ClippingPlanes) {
               "-i 20 --size 96x64 --clip 1,1,-0.5 --color-by 1,2,0 --background black,skin", 2);
 }
 
-TEST_F(CliRanks, Turntables) {
-  expect_same(convert("--exact"), "-i 90 --size 48x32 --turntable 3", 2);
+TEST_F(CliRanks, ScenesAndTurntables) {
+  expect_same(convert("--exact"),
+              "--surface 20,skin,0.4 --surface 90 --slice z --light 1,1,0 --shadow 1 --size 48x32",
+              2);
+  expect_same(kFuel, "-i 40 --clip 0,0,1,12 --color-by volume --size 48x32 --turntable 3", 3);
 }
 
 /// WithinAnError has both, too.
 TEST_F(CliRanks, AmbientRaysOfLevels) {
-  skip_unless_long();
-  if (IsSkipped()) return;
+  if (skip_unless_long(); IsSkipped()) return;
   expect_same(convert("--exact --levels 3"),
               "-i 40 --size 48x32 --voxel-pixels 1.5 --ambient 3 --samples 2", 3);
 }
@@ -450,7 +452,7 @@ TEST_F(CliRanks, RefuseWhatTheyCannotDo) {
   const std::string within = render + "--max-surface-error ";
   expect_error(on_ranks(2, "render " + kFuel + " --surface 40,bone,0.5 --size 16x16 " +
                                "--progress-dir " + quoted(folder_ / "passes")),
-               "--progress-dir: with mpirun, --surface draws no pictures of passes");
+               "--progress-dir: with mpirun, surfaces and slices have no pictures of passes");
   expect_error(on_ranks(2, within + "1"), "convert --levels all, or do without them: --levels 1");
   expect_error(on_ranks(2, within + "0 --levels 1"), "give more than 0");
   expect_error(on_ranks(2, "render " + convert("--rate 8 --no-verify") +

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 #include "core/base/error.hpp"
@@ -281,6 +282,36 @@ TEST(IsClipped, AGivenRayBehindAPlane) {
   expect_left_at(params, {1, 0.5f, 0.5f, 0.25f, 0.5f, 0, 2}, 4, 3);
   const ClipParams none = make_clip_params(info, frame.view, camera, {});
   EXPECT_FALSE(is_clipped(&none, {4, 2, 2, 1, 0, 0, 0}, 1, 1e6f));
+}
+
+TEST(Entering, ARayThatBeginsBehindPlanes) {
+  const VolumeInfo info = test::grid_info({20, 20, 20});
+  const Camera camera = test::camera_along({-10, 3, 3}, {1, 0, 0});
+  const FrameParams frame = make_frame_params(info, camera, {3, 3}, 0);
+  const ClipParams params = make_clip_params(info, frame.view, camera,
+                                             {{{{1, 0, 0}, 8}, {{-1, 0, 0}, -12}, {{0, 2, 0}, 2}}});
+  // What is left: x from 8 to 12, y from 1 on.
+  const auto entered = [&](const GivenRay &given, float voxel = 1) {
+    return entering(&params, given, voxel);
+  };
+  const GivenRay within{9, 2, 2, 1, -1, 0.5f, 0};
+  const GivenRay same = entered(within);
+  EXPECT_EQ(std::memcmp(&same, &within, sizeof(within)), 0);
+  const GivenRay from_x = entered({4, 2, 2, 2, 0, 1, 0});
+  EXPECT_FLOAT_EQ(from_x.o_x, 8);
+  EXPECT_FLOAT_EQ(from_x.o_z, 4);
+  expect_left_at(params, from_x, 1, 2);
+  const GivenRay from_both = entered({7, -2, 2, 1, 1, 0, 0});
+  EXPECT_FLOAT_EQ(from_both.o_x, 10);
+  EXPECT_FLOAT_EQ(from_both.o_y, 1);
+  // In voxels of 4.
+  EXPECT_FLOAT_EQ(entered({1, 0.5f, 0.5f, 0.5f, 0, 0, 2}, 4).o_x, 2);
+  // These never are within all planes.
+  for (const GivenRay &never : {GivenRay{4, 2, 2, -1, 0, 0, 0}, GivenRay{4, 2, 2, 0, 1, 0, 0},
+                                GivenRay{4, -20, 2, 1, 1, 0, 0}, GivenRay{14, 2, 2, 1, 0, 0, 0}}) {
+    for (const float t : {0.01f, 1.0f, 100.0f})
+      EXPECT_TRUE(is_clipped(&params, entered(never), 1, t)) << never.o_x << " at " << t;
+  }
 }
 
 }  // namespace

@@ -5,6 +5,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <memory>
 #include <vector>
 
 #include "core/host/host_renderer.hpp"
@@ -120,12 +122,55 @@ void expect_plain_light(Renderer &renderer, const VolumeInfo &info) {
   EXPECT_EQ(renderer.shade(request.light).pixels, listed.pixels);
 }
 
+/// Two balls. The one at small x has no values above `most`.
+CompressedVolume two_balls(double most) {
+  VolumeInfo info = test::grid_info({48, 24, 24});
+  info.type = VoxelType::kUint8;
+  const std::vector<float> voxels = test::sample(info.dims, [&](const glm::dvec3 &at) {
+    const auto ball = [&](double x) {
+      return std::round(std::max(0.0, 255 - 25 * glm::length(at - glm::dvec3(x, 11.5, 11.5))));
+    };
+    return std::max(std::min(most, ball(12)), ball(36));
+  });
+  return test::TestVolume(info, voxels, ErrorGoal{.exact = true}).compressed;
+}
+
+/// What planes have taken away casts no shadow on a surface that they leave whole, and what they
+/// have left does, though rays come from what they have taken away.
+///
+/// make  a renderer of a volume
+template <class Make>
+void expect_light_through_what_is_clipped(const Make &make) {
+  const CompressedVolume volume = two_balls(255), without_core = two_balls(150);
+  FrameRequest request{.camera = orbit_cameras(volume.info, 3)[1]};
+  request.surfaces = {{50, {0.9f, 0.9f, 0.2f}, 0.4f, false}, {180, {0.1f, 0.4f, 0.8f}, 1, true}};
+  request.light.towards_light = glm::dvec3(1, 0.1, 0.05);
+  request.ambient_rays = request.shadow_rays = 2;
+  const Clip clip{{{{1, 0, 0}, 24}}};
+  const auto picture = [&](const CompressedVolume &of) {
+    const std::unique_ptr<Renderer> renderer = make(of);
+    renderer->render(request);
+    return renderer->shade(request.light).pixels;
+  };
+  EXPECT_NE(picture(volume), picture(without_core));
+  request.clip = clip;
+  const std::vector<std::uint8_t> clipped = picture(volume);
+  EXPECT_EQ(clipped, picture(without_core));
+  request.clip.planes[0].offset = 1000;
+  EXPECT_NE(clipped, picture(volume)) << "the other ball's core casts shadows";
+}
+
 TEST(LayerLightHost, PicturesAreTheTwins) {
   const CompressedVolume volume = gyroid();
   HostRenderer renderer(volume, {.largest = kSize});
   expect_scenes_lit_as_the_twin(renderer, volume);
   expect_light_behind_glass(renderer, volume.info);
   expect_plain_light(renderer, volume.info);
+  expect_light_through_what_is_clipped([](const CompressedVolume &of) {
+    return std::make_unique<HostRenderer>(of, HostRendererOptions{.largest = kSize});
+  });
+  expect_light_through_what_is_clipped(
+      [](const CompressedVolume &of) { return std::make_unique<TwinRenderer>(of, kSize); });
 }
 
 class LayerLightOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
@@ -147,6 +192,7 @@ TEST_P(LayerLightOnDevice, SmallFrame) {
   DeviceRenderer renderer = renderer_of(volume, {.size = kSmall, .cache_slots = 30});
   TwinRenderer twin(volume, kSmall);
   FrameRequest request = lit_request(volume.info, kScenes[2]);
+  request.clip = {{through(volume.info, 0.5, {-0.3, -1, 0.2})}};
   request.ambient_rays = request.shadow_rays = 1;
   expect_lit_as_the_twin(renderer, twin, request);
 }
@@ -157,6 +203,10 @@ TEST_P(LayerLightOnDevice, PicturesAreTheTwins) {
   expect_scenes_lit_as_the_twin(renderer, volume);
   expect_light_behind_glass(renderer, volume.info);
   expect_plain_light(renderer, volume.info);
+  expect_light_through_what_is_clipped([&](const CompressedVolume &of) {
+    return std::make_unique<DeviceRenderer>(
+        device_, of, RendererOptions{.size = kSize, .max_surfaces = 4, .with_given_rays = true});
+  });
 }
 
 /// Rays wait for blocks, and pictures of all passes are looked at.
