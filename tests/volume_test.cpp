@@ -204,7 +204,10 @@ TEST(OpenVolume, UnknownOrMissingFiles) {
   EXPECT_THAT([&] { open_volume(folder / "b_2x2x2_uint8.raw"); },
               ThrowsMessage<Error>(HasSubstr("no such file")));
   EXPECT_THAT([&] { open_volume(folder.path()); },
-              ThrowsMessage<Error>(HasSubstr("not a regular file")));
+              ThrowsMessage<Error>(HasSubstr("reads folders of TIFF and DICOM files, and zarr")));
+  write_file(folder / "a.TIFF", std::string_view("x"));
+  EXPECT_THAT([&] { open_volume(folder / "a.TIFF"); },
+              ThrowsMessage<Error>(HasSubstr("reads such files: pip install 'isowave[files]'")));
 }
 
 }  // namespace

@@ -36,7 +36,7 @@ class NiftiHeader {
     is_swapped_ = !has_size();
     if (!has_size()) fail("not a NIfTI-1 file");
     if (get<std::int32_t>(0) == kNifti2)
-      fail("NIfTI-2, which is not supported: convert it to NIfTI-1");
+      fail("NIfTI-2: isowave's Python package reads it: pip install 'isowave[files]'");
   }
 
   bool is_big_endian() const { return is_swapped_; }

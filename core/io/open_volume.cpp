@@ -25,6 +25,24 @@ bool has_ending(const fs::path &path, std::initializer_list<std::string_view> en
                      [&](std::string_view ending) { return name.ends_with(ending); });
 }
 
+/// The kinds of files that the Python package reads by other libraries.
+constexpr std::initializer_list<std::string_view> kKindsOfPython = {
+    ".tif", ".tiff", ".dcm", ".dicom", ".ima", ".h5",     ".hdf5",   ".nc",  ".nc4",
+    ".npy", ".npz",  ".mrc", ".map",   ".rec", ".mrc.gz", ".map.gz", ".vti", ".vtk"};
+
+/// Throws  Error: a folder, or a kind of file that is not read here
+[[noreturn]] void refuse_kind(const fs::path &path) {
+  const bool is_folder = fs::is_directory(path);
+  if (is_folder || has_ending(path, kKindsOfPython))
+    throw Error(
+        "{}: isowave's Python package reads {}: pip install 'isowave[files]', which brings this "
+        "command, too",
+        path.string(), is_folder ? "folders of TIFF and DICOM files, and zarr" : "such files");
+  throw Error(
+      "{}: unknown kind of volume: use .raw, .raw.gz, .nrrd, .nhdr, .mha, .mhd, .nii or .nii.gz",
+      path.string());
+}
+
 /// Nothing for kinds of files that have none.
 std::optional<VolumeHeader> read_header(const std::shared_ptr<const InputFile> &file) {
   const fs::path &path = file->path();
@@ -51,15 +69,12 @@ std::optional<std::uint32_t> num_steps(const fs::path &path) {
 
 std::unique_ptr<VolumeReader> open_volume(const fs::path &path, const RawOverrides &overrides,
                                           std::optional<std::uint32_t> step) {
+  if (fs::is_directory(path)) refuse_kind(path);
   const auto file = std::make_shared<const InputFile>(path);
   if (has_ending(path, {".raw", ".raw.gz"}))
     return open_raw(file, has_ending(path, {".gz"}), overrides);
   std::optional<VolumeHeader> header = read_header(file);
-  if (!header) {
-    throw Error(
-        "{}: unknown kind of volume: use .raw, .raw.gz, .nrrd, .nhdr, .mha, .mhd, .nii or .nii.gz",
-        path.string());
-  }
+  if (!header) refuse_kind(path);
   if (overrides.dims || overrides.type) {
     throw Error("{}: dims and type are for raw files; this file's header gives its own",
                 path.string());
