@@ -25,15 +25,17 @@ bool has_ending(const fs::path &path, std::initializer_list<std::string_view> en
                      [&](std::string_view ending) { return name.ends_with(ending); });
 }
 
-/// The kinds of files that the Python package reads by other libraries.
-constexpr std::initializer_list<std::string_view> kKindsOfPython = {
-    ".tif", ".tiff", ".dcm", ".dicom", ".ima", ".h5",     ".hdf5",   ".nc",  ".nc4",
-    ".npy", ".npz",  ".mrc", ".map",   ".rec", ".mrc.gz", ".map.gz", ".vti", ".vtk"};
+/// Whether the Python package reads such files, by other libraries.
+bool is_of_python(const fs::path &path) {
+  return has_ending(
+      path, {".tif", ".tiff", ".dcm", ".dicom", ".ima", ".h5", ".hdf5", ".nc", ".nc4", ".npy",
+             ".npz", ".mrc", ".map", ".rec", ".mrc.gz", ".map.gz", ".vti", ".vtk"});
+}
 
 /// Throws  Error: a folder, or a kind of file that is not read here
 [[noreturn]] void refuse_kind(const fs::path &path) {
   const bool is_folder = fs::is_directory(path);
-  if (is_folder || has_ending(path, kKindsOfPython))
+  if (is_folder || is_of_python(path))
     throw Error(
         "{}: isowave's Python package reads {}: pip install 'isowave[files]', which brings this "
         "command, too",
