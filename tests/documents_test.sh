@@ -16,6 +16,19 @@ fail() {
 "$top/tools/tables" --check || fail 'a document is not what was measured: run tools/tables'
 
 device=${ISOWAVE_DEVICE:-cpu}
+"$programs/bench/isowave_bench" --device "$device" --benchmark_list_tests > "$work/cases"
+PYTHONPATH=$top/tools /usr/bin/python3 -B - "$work/cases" << 'EOF' || fail 'tools/measure leaves stages out'
+import re, sys
+from measuring.speed import KERNELS
+cases = [line.strip() for line in open(sys.argv[1]) if "/" in line or line.strip() == "speculation"]
+stems = {case.split("/")[0] for case in cases} - {"ocl_launch", "voxel_region"}  # no stages
+assert len(stems) > 20, stems
+left_out = [
+    stem for stem in stems
+    if not any(re.search("|".join(KERNELS), case) for case in cases if case.split("/")[0] == stem)
+]
+assert not left_out, left_out
+EOF
 measure() { "$top/tools/measure" --device "$device" --programs "$programs" --quick "$@"; }
 mkdir -p "$work/top/results"
 results=$work/top/results/a.json
