@@ -150,7 +150,7 @@ def test_bounds_of_the_error(drawn, levelled):
         ("surfaces", "made with_surfaces"),
         ("labels", "labels needs a renderer that was made with labels=True"),
         ("field", "no field to colour by"),
-        ("no field", "rank 0: "),
+        ("no field", "reads folders of TIFF and DICOM files, and zarr"),
         ("bounce", "made with_bounce"),
         ("neither", "give an isovalue, or surfaces"),
         ("auto", "isovalue='auto': no process sees the whole volume: give a number"),
