@@ -269,11 +269,32 @@ void expect_twins_bytes(ocl::Device &device, const CompressedVolume &volume,
   }
 }
 
+/// Small enough for Oclgrind.
 TEST_P(FieldValuesOnDevice, SmallFrameHasTheTwinsBytes) {
-  const CompressedVolume volume = test::turned_gyroid(), other = test::field_of_gyroid();
+  constexpr ImageSize kSmall{15, 11};
+  const CompressedVolume volume =
+      test::compressed_at_12_bits(test::grid_info({10, 9, 12}), test::gyroid_field(6));
+  VolumeInfo info = test::grid_info({6, 8, 7});
+  info.origin = {1, 0.5, 2};
+  const CompressedVolume other = test::compressed_at_12_bits(
+      info, [](const glm::dvec3 &p) { return std::sin(p.x) + 0.3 * p.y - 0.2 * p.z; });
   FrameRequest request = request_of(volume.info);
-  request.size = {29, 23};
-  expect_twins_bytes(device_, volume, other, {}, std::array{request});
+  request.size = kSmall;
+  TwinRenderer twin(volume, kSmall, kDefaultSolver, &other);
+  twin.render(request);
+  EXPECT_GT(num_values(twin.field_values()), 20u);
+  DeviceRenderer renderer(device_, volume, {.size = kSmall, .cache_slots = 30, .field = &other});
+  for (int time = 0; time < 2; ++time) {
+    renderer.render(request);
+    EXPECT_EQ(bits_of(renderer.field_values()), bits_of(twin.field_values()));
+    EXPECT_EQ(renderer.field_range(), twin.field_range());
+    EXPECT_EQ(renderer.shade(test::by_field()).pixels, twin.shade(test::by_field()).pixels);
+  }
+}
+
+TEST_P(FieldValuesOnDevice, FrameHasTheTwinsBytes) {
+  const CompressedVolume volume = test::turned_gyroid(), other = test::field_of_gyroid();
+  expect_twins_bytes(device_, volume, other, {}, std::array{request_of(volume.info)});
 }
 
 TEST_P(FieldValuesOnDevice, FewSlotsServeAllHits) {
