@@ -94,30 +94,23 @@ TEST_P(BrickScenesOnDevice, LightOfSeveralSurfaces) {
   EXPECT_NE(lit.picture.pixels, unlit.picture.pixels);
 }
 
-/// Slices lie within bricks, in the planes of cuts and across each other. Some of their voxels have
-/// no data, so that nothing is seen of hits there.
-TEST_P(BrickScenesOnDevice, Slices) {
-  std::vector<float> voxels = test::sample(volume_.info().dims, test::gyroid_field(9));
-  for (std::size_t i = 0; i < voxels.size(); ++i) {
-    if (i / 5 % 7 == 0) voxels[i] = std::nanf("");
-  }
-  const TestVolume with_holes(volume_.info(), voxels, 12);
+/// Within bricks, in the planes of cuts and across each other.
+const Slices kSlices{{{{{1, 0, 0}, 16}, 0.5f},
+                      {{{0, 0, 1}, 12}, 0.6f},
+                      {{{0.3, -1, 0.4}, -8.3}, 0.7f, false},
+                      {{{0, 1, 0}, 29}, 0.2f}},
+                     -1,
+                     1,
+                     color_map("viridis")};
+
+TEST_P(BrickScenesOnDevice, SlicesBesideASurface) {
   for (const std::uint32_t samples : {1u, 2u}) {
     request_.size = {kFrame.width, kFrame.height, samples};
     request_.surfaces = {{0.2f, {0.2f, 0.4f, 0.9f}, 0.3f}};
-    request_.slices = {{{{{1, 0, 0}, 16}, 0.5f},
-                        {{{0, 0, 1}, 12}, 0.6f},
-                        {{{0.3, -1, 0.4}, -8.3}, 0.7f, false},
-                        {{{0, 1, 0}, 29}, 0.2f}},
-                       -1,
-                       1,
-                       color_map("viridis")};
+    request_.slices = kSlices;
     request_.clip = {{{{0.3, 1, 0.2}, 9}}, true};
     const RendererOptions options{.max_surfaces = 1, .with_given_rays = true};
     const Shown whole = expect_of_one(volume_.compressed, nullptr, options, request_);
-    const Shown holes =
-        expect_of_one(with_holes.compressed, nullptr, {.max_surfaces = 1}, request_);
-    EXPECT_NE(holes.picture.pixels, whole.picture.pixels);
     EXPECT_GT(whole.layers.layers, 4u);
     // Behind an opaque surface, no brick's hits count.
     request_.surfaces[0].opacity = 1;
@@ -126,6 +119,21 @@ TEST_P(BrickScenesOnDevice, Slices) {
     EXPECT_LT(opaque.layers.hits, whole.layers.hits);
     request_.ambient_rays = 0;
   }
+}
+
+/// Nothing is seen of hits there, and rays go on behind them.
+TEST_P(BrickScenesOnDevice, SlicesOfVoxelsWithoutData) {
+  std::vector<float> voxels = test::sample(volume_.info().dims, test::gyroid_field(9));
+  for (std::size_t i = 0; i < voxels.size(); ++i) {
+    if (i / 5 % 7 == 0) voxels[i] = std::nanf("");
+  }
+  const TestVolume with_holes(volume_.info(), voxels, 12);
+  request_.size = kFrame;
+  request_.surfaces = {{0.2f, {0.2f, 0.4f, 0.9f}, 0.3f}};
+  request_.slices = kSlices;
+  const Shown whole = expect_of_one(volume_.compressed, nullptr, {.max_surfaces = 1}, request_);
+  const Shown holes = expect_of_one(with_holes.compressed, nullptr, {.max_surfaces = 1}, request_);
+  EXPECT_NE(holes.picture.pixels, whole.picture.pixels);
 }
 
 /// From parallel rays along an axis: slices at right angles to them, one in the plane of a cut.

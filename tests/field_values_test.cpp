@@ -271,11 +271,11 @@ void expect_twins_bytes(ocl::Device &device, const CompressedVolume &volume,
 
 /// Small enough for Oclgrind.
 TEST_P(FieldValuesOnDevice, SmallFrameHasTheTwinsBytes) {
-  constexpr ImageSize kSmall{15, 11};
+  constexpr ImageSize kSmall{21, 15};
   const CompressedVolume volume =
       test::compressed_at_12_bits(test::grid_info({10, 9, 12}), test::gyroid_field(6));
-  VolumeInfo info = test::grid_info({6, 8, 7});
-  info.origin = {1, 0.5, 2};
+  VolumeInfo info = test::grid_info({9, 7, 8});
+  info.origin = {0.5, 1, 2.5};
   const CompressedVolume other = test::compressed_at_12_bits(
       info, [](const glm::dvec3 &p) { return std::sin(p.x) + 0.3 * p.y - 0.2 * p.z; });
   FrameRequest request = request_of(volume.info);
