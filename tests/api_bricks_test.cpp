@@ -111,7 +111,7 @@ TEST(ApiBricks, SurfacesOfOneRenderer) {
   EXPECT_GT(expected.statistics.layers, 4u);
 }
 
-/// A field of which each process keeps what it needs, and labels with their own colours.
+/// Each process keeps what it needs of the field. Labels have their own colours.
 TEST(ApiBricks, FieldsAndLabelsOfOneRenderer) {
   const Compression exact{.exact = true};
   const std::shared_ptr<const Volume> fuel = open_volume(kFuel, exact);

@@ -56,8 +56,8 @@ class BrickTeam : public testing::TestWithParam<ocl::DeviceInfo> {
 
   /// The same of any volume.
   ///
-  /// field  of which each rank keeps what its brick needs; null: none; the volume: bricks are
-  ///        their own fields
+  /// field  each rank keeps what its brick needs; null: none; the volume: bricks are their own
+  ///        fields
   void on_ranks(std::uint32_t size, const CompressedVolume &volume, const CompressedVolume *field,
                 const RendererOptions &options, const Work &work) {
     const Cuts cuts(blocks_along(volume.info), size);

@@ -102,7 +102,8 @@ class HitOrder {
   std::vector<std::uint32_t> numbers_;
 };
 
-/// Puts the layers of all bricks together. Members but `colors` are alike at all ranks.
+/// Puts the layers of all bricks together. Only rank 0 knows colours; all ranks know where rays
+/// end.
 class TeamRenderer::Layering {
  public:
   Layering(TeamRenderer &renderer, const FrameRequest &request,
@@ -210,7 +211,7 @@ class TeamRenderer::Layering {
     return open;
   }
 
-  /// Returns the number of hits of which something is seen.
+  /// Returns the number of hits that are seen.
   std::uint64_t blend(std::span<const SentWords> hits, const OpenCounts &open) {
     const bool blends = of_.team_.rank() == 0;
     std::uint64_t count = 0;
@@ -234,7 +235,7 @@ class TeamRenderer::Layering {
   }
 
   HitRecord hit_of(std::uint64_t word, const SentHit &sent) const {
-    HitRecord hit = with_surface(no_hit(), 0);
+    HitRecord hit = no_hit();
     hit.t = HitOrder::t(word);
     hit.block_id = 0;  // blocks are a brick's own
     hit.cell = order_.surface(word) << ISO_SURFACE_BIT;
@@ -256,7 +257,7 @@ class TeamRenderer::Layering {
   std::vector<RayColor> seen_;
   std::vector<std::uint64_t> words_, own_words_;  ///< [ray] of the layer
   std::vector<HitRecord> first_hits_;             ///< [ray] this brick's
-  std::vector<bool> has_hit_;                     ///< [ray] of which something is seen
+  std::vector<bool> has_hit_;                     ///< [ray] one that is seen
 };
 
 /// request: with light rays, which go on in other bricks.

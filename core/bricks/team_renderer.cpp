@@ -70,7 +70,7 @@ FrameStats TeamRenderer::render(const FrameRequest &request) {
   check_levels(request);
   const View view = make_view(whole_levels_.front(), request.camera, size_of(request, abilities()));
   place_ = cuts_.order_from(eye_of(view))[team_.rank()];
-  own_hits_.clear();
+  forget_hits();
   num_hits_.reset();
   has_whole_ = false;
   const FrameRequest own = without_light_rays(request);
@@ -105,7 +105,7 @@ FrameStats TeamRenderer::render_in_step(const FrameRequest &request) {
   const auto take_part = [&](State state) {
     tell(state);
     if (all_through || one_failed) return false;
-    own_hits_.clear();
+    forget_hits();
     is_stopped = !request.on_pass(last);
     return !is_stopped;
   };
@@ -143,12 +143,12 @@ Camera TeamRenderer::camera(std::span<const float> isovalues, std::optional<Imag
 /// The kept picture may fill own hits, but not those of all bricks.
 void TeamRenderer::fill_from_kept() {
   renderer_.fill_from_kept();
-  if (!has_whole_) own_hits_.clear();
+  if (!has_whole_) forget_hits();
 }
 
 void TeamRenderer::enlarge_kept(const FrameRequest &request) {
   renderer_.enlarge_kept(request);
-  if (!has_whole_) own_hits_.clear();
+  if (!has_whole_) forget_hits();
 }
 
 Camera TeamRenderer::label_camera(std::span<const std::uint16_t> labels,
@@ -302,10 +302,11 @@ void TeamRenderer::add_ambient(const FrameRequest &request, FrameStats &stats) {
     together(team_, [&] { renderer_.filter_bounced(request); });
 }
 
-std::vector<float> TeamRenderer::compose_values() {
+const std::vector<float> &TeamRenderer::compose_values() {
+  if (values_) return *values_;
   const std::vector<float> own = renderer_.field_values();
   const std::span<const HitRecord> hits = own_hits();
-  std::vector<float> values(team_.rank() == 0 ? own.size() : 0, no_value());
+  std::vector<float> &values = values_.emplace(team_.rank() == 0 ? own.size() : 0, no_value());
   compose(
       Receiver::kRank0,
       [&](std::size_t begin, std::span<std::uint64_t> words) {
@@ -327,6 +328,12 @@ std::optional<std::array<float, 2>> TeamRenderer::field_range() {
   range = of_first(team_, range);
   if (range.empty()) return {};
   return {{range[0], range[1]}};
+}
+
+/// The next pass, or frame, has others.
+void TeamRenderer::forget_hits() {
+  own_hits_.clear();
+  values_.reset();
 }
 
 std::span<const HitRecord> TeamRenderer::own_hits() {
@@ -398,7 +405,7 @@ FrameArrays TeamRenderer::fetch(const WantedArrays &wanted, const Appearance &ap
   FrameArrays arrays;
   if (wanted.picture) arrays.picture = compose_picture(appearance);
   if (wanted.field_values) {
-    const std::vector<float> values = compose_values();
+    const std::vector<float> &values = compose_values();
     if (receives) {
       arrays.field_values = memory_.array<float>(values.size());
       std::ranges::copy(values, arrays.field_values.data());

@@ -113,7 +113,8 @@ class TeamRenderer : public Renderer {
                                       Receiver who = Receiver::kRank0);
   std::span<const HitRecord> own_hits();
   /// The field's values at the hits that win, at rank 0.
-  std::vector<float> compose_values();
+  const std::vector<float> &compose_values();
+  void forget_hits();
 
   DeviceRenderer renderer_;
   VolumeInfo brick_;
@@ -121,10 +122,11 @@ class TeamRenderer : public Renderer {
   std::vector<VolumeInfo> whole_levels_;
   std::size_t num_levels_;  ///< number of these that the brick has
   Team &team_;
-  std::uint32_t place_ = 0;                ///< place of the brick, seen from the frame's eye
-  std::vector<HitRecord> own_hits_;        ///< empty: not read yet
-  bool has_whole_ = false;                 ///< the renderer has the hits of all bricks already
-  std::optional<std::uint64_t> num_hits_;  ///< hits in what was put together last
+  std::uint32_t place_ = 0;                   ///< place of the brick, seen from the frame's eye
+  std::vector<HitRecord> own_hits_;           ///< empty: not read yet
+  std::optional<std::vector<float>> values_;  ///< of compose_values(); none: not composed yet
+  bool has_whole_ = false;                    ///< the renderer has the hits of all bricks already
+  std::optional<std::uint64_t> num_hits_;     ///< hits in what was put together last
   CompositionStats composition_;
   HostMemory memory_;
 };

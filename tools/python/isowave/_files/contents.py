@@ -1,4 +1,4 @@
-"""What is in a file: arrays, one of which is chosen, and its axes."""
+"""What is in a file: arrays and their axes. One array is chosen."""
 
 from __future__ import annotations
 
