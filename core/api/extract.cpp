@@ -15,8 +15,9 @@ namespace {
 
 using core::guarded;
 
-void extract_to(const std::shared_ptr<Device> &device, const std::shared_ptr<const Volume> &volume,
-                double isovalue, const ExtractOptions &options, core::MeshSink &sink) {
+core::SimplifiedMesh extract_to(const std::shared_ptr<Device> &device,
+                                const std::shared_ptr<const Volume> &volume, double isovalue,
+                                const ExtractOptions &options, core::MeshSink &sink) {
   if (!device || !volume) throw core::Error("extracting needs a device and a volume");
   const core::CompressedVolume &level = level_to_extract(*volume, options);
   const std::lock_guard lock(device->implementation().mutex);
@@ -24,13 +25,17 @@ void extract_to(const std::shared_ptr<Device> &device, const std::shared_ptr<con
     if (options.progress) options.progress("extracting", 0);
   };
   const KernelWatch watch(device->implementation().device, before_kernel);
-  core::Extractor extractor(device->implementation().device, level,
-                            {.with_normals = options.with_normals,
-                             .vertices = static_cast<core::VertexPlaces>(options.vertices),
-                             .memory_budget = options.memory_budget,
-                             .cache_slots = options.cache_blocks});
-  extractor.extract(core::drawn_isovalue(volume->implementation().volume, isovalue), sink,
-                    progress_of(options, "extracting"));
+  const float drawn = core::drawn_isovalue(volume->implementation().volume, isovalue);
+  const auto places = static_cast<core::VertexPlaces>(options.vertices);
+  return core::give_changed(level, drawn, places, changes_of(options), sink,
+                            [&](core::MeshSink &to) {
+                              core::Extractor extractor(device->implementation().device, level,
+                                                        {.with_normals = options.with_normals,
+                                                         .vertices = places,
+                                                         .memory_budget = options.memory_budget,
+                                                         .cache_slots = options.cache_blocks});
+                              extractor.extract(drawn, to, progress_of(options, "extracting"));
+                            });
 }
 
 }  // namespace
@@ -39,7 +44,7 @@ Mesh extract(const std::shared_ptr<Device> &device, const std::shared_ptr<const 
              double isovalue, const ExtractOptions &options) {
   return guarded("extracting a surface", [&] {
     return extracted(
-        [&](core::MeshSink &sink) { extract_to(device, volume, isovalue, options, sink); });
+        [&](core::MeshSink &sink) { return extract_to(device, volume, isovalue, options, sink); });
   });
 }
 
@@ -48,7 +53,7 @@ std::string extract_to_file(const std::shared_ptr<Device> &device,
                             const std::filesystem::path &path, const ExtractOptions &options) {
   return guarded("extracting a surface", [&] {
     return extracted_to_file(path, options, [&](core::MeshSink &sink) {
-      extract_to(device, volume, isovalue, options, sink);
+      return extract_to(device, volume, isovalue, options, sink);
     });
   });
 }

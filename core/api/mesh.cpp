@@ -18,17 +18,22 @@ using core::guarded;
 static_assert(static_cast<int>(VertexPlaces::kExact) ==
               static_cast<int>(core::VertexPlaces::kExact));
 
-void extract_to(const std::shared_ptr<const Volume> &volume, double isovalue,
-                const ExtractOptions &options, core::MeshSink &sink) {
+core::SimplifiedMesh extract_to(const std::shared_ptr<const Volume> &volume, double isovalue,
+                                const ExtractOptions &options, core::MeshSink &sink) {
   if (!volume) throw core::Error("extracting needs a volume");
   if (options.cache_blocks != 0)
     throw core::Error("a number of cached blocks is for devices alone: leave out cache_blocks");
-  core::extract_on_host(level_to_extract(*volume, options),
-                        core::drawn_isovalue(volume->implementation().volume, isovalue),
-                        {.with_normals = options.with_normals,
-                         .vertices = static_cast<core::VertexPlaces>(options.vertices),
-                         .memory_limit = options.memory_budget},
-                        sink, progress_of(options, "extracting"));
+  const core::CompressedVolume &level = level_to_extract(*volume, options);
+  const float drawn = core::drawn_isovalue(volume->implementation().volume, isovalue);
+  const auto places = static_cast<core::VertexPlaces>(options.vertices);
+  return core::give_changed(level, drawn, places, changes_of(options), sink,
+                            [&](core::MeshSink &to) {
+                              core::extract_on_host(level, drawn,
+                                                    {.with_normals = options.with_normals,
+                                                     .vertices = places,
+                                                     .memory_limit = options.memory_budget},
+                                                    to, progress_of(options, "extracting"));
+                            });
 }
 
 }  // namespace
@@ -50,6 +55,10 @@ core::Progress progress_of(const ExtractOptions &options, std::string_view what)
   };
 }
 
+core::MeshChanges changes_of(const ExtractOptions &options) {
+  return {options.closed, options.largest, options.simplify};
+}
+
 void MeshOfUser::begin(const core::MeshSize &size) {
   mesh.vertices.reserve(size.num_vertices);
   if (size.has_normals) mesh.normals.reserve(size.num_vertices);
@@ -66,15 +75,17 @@ void MeshOfUser::add(const core::MeshPart &part) {
 Mesh extract(const std::shared_ptr<const Volume> &volume, double isovalue,
              const ExtractOptions &options) {
   return guarded("extracting a surface", [&] {
-    return extracted([&](core::MeshSink &sink) { extract_to(volume, isovalue, options, sink); });
+    return extracted(
+        [&](core::MeshSink &sink) { return extract_to(volume, isovalue, options, sink); });
   });
 }
 
 std::string extract_to_file(const std::shared_ptr<const Volume> &volume, double isovalue,
                             const std::filesystem::path &path, const ExtractOptions &options) {
   return guarded("extracting a surface", [&] {
-    return extracted_to_file(
-        path, options, [&](core::MeshSink &sink) { extract_to(volume, isovalue, options, sink); });
+    return extracted_to_file(path, options, [&](core::MeshSink &sink) {
+      return extract_to(volume, isovalue, options, sink);
+    });
   });
 }
 

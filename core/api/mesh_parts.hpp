@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "core/mesh/mesh.hpp"
+#include "core/mesh/mesh_changes.hpp"
 #include "core/mesh/mesh_file.hpp"
 #include "core/zfp/zfp_stream.hpp"
 #include "isowave/mesh.hpp"
@@ -19,6 +20,8 @@ const core::CompressedVolume &level_to_extract(const Volume &volume, const Extra
 /// Calls options.progress of the step `what`. Empty if there is none.
 core::Progress progress_of(const ExtractOptions &options, std::string_view what);
 
+core::MeshChanges changes_of(const ExtractOptions &options);
+
 /// Fills a mesh of users.
 class MeshOfUser : public core::MeshSink {
  public:
@@ -32,7 +35,7 @@ class MeshOfUser : public core::MeshSink {
 template <class ExtractTo>
 Mesh extracted(const ExtractTo &extract_to) {
   MeshOfUser sink;
-  extract_to(sink);
+  sink.mesh.simplify_error = extract_to(sink).error;
   return std::move(sink.mesh);
 }
 
@@ -41,9 +44,9 @@ template <class ExtractTo>
 std::string extracted_to_file(const std::filesystem::path &path, const ExtractOptions &options,
                               const ExtractTo &extract_to) {
   core::MeshFile file(path);
-  extract_to(file);
+  const core::SimplifiedMesh simplified = extract_to(file);
   file.commit(progress_of(options, "writing"));
-  return file.notice();
+  return options.simplify < 1 ? describe(simplified) + file.notice() : file.notice();
 }
 
 }  // namespace isowave

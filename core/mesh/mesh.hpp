@@ -66,6 +66,7 @@ class MeshPlacement {
   /// block   whose vertex it is
   /// vertex  its edge's bits 0..7 and t are used
   glm::dvec3 position(const glm::uvec3 &block, const MeshVertex &vertex) const;
+  glm::dvec3 position(const glm::uvec3 &voxel) const { return positions_(glm::dvec3(voxel)); }
   /// The unit normal in world space of a gradient in index space; 0 if the gradient is 0.
   glm::vec3 normal(const Gradient &gradient) const;
   /// The triangle, turned round if the volume's axes are left-handed, so that it is seen from the

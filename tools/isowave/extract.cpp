@@ -11,6 +11,7 @@
 #include "core/extract/extractor.hpp"
 #include "core/io/atomic_file.hpp"
 #include "core/io/file_name.hpp"
+#include "core/mesh/mesh_changes.hpp"
 #include "core/mesh/mesh_file.hpp"
 #include "core/view/detail.hpp"
 #include "core/zfp/describe_compression.hpp"
@@ -37,6 +38,7 @@ struct ExtractArgs {
   std::uint32_t level = 0;
   std::string normals = "smooth", vertices = "apart", stream = "auto";
   ExtractorOptions extractor;
+  MeshChanges changes;
   bool isovalue_suggested = false;
 };
 
@@ -52,8 +54,26 @@ const CompressedVolume &level_of(const CompressedVolume &volume, std::uint32_t l
   return *levels[level];
 }
 
+/// Counts what it hands on.
+class Counted : public MeshSink {
+ public:
+  explicit Counted(MeshSink &inner) : inner_(inner) {}
+  void begin(const MeshSize &size) override { inner_.begin(size); }
+  void add(const MeshPart &part) override {
+    size.num_vertices += part.vertices.size();
+    size.num_triangles += part.triangles.size();
+    inner_.add(part);
+  }
+
+  MeshSize size;
+
+ private:
+  MeshSink &inner_;
+};
+
 nlohmann::ordered_json stats_json(const ExtractArgs &options, const CompressedVolume &volume,
-                                  ocl::Device &device, const ExtractStats &stats) {
+                                  ocl::Device &device, const ExtractStats &stats,
+                                  const MeshSize &written, const SimplifiedMesh &simplified) {
   const glm::uvec3 dims = volume.info.dims;
   return {
       {"program", program_name()},
@@ -70,8 +90,12 @@ nlohmann::ordered_json stats_json(const ExtractArgs &options, const CompressedVo
       {"level", options.level},
       {"normals", options.normals},
       {"vertex_places", options.vertices},
-      {"vertices", stats.size.num_vertices},
-      {"triangles", stats.size.num_triangles},
+      {"closed", options.changes.closed},
+      {"largest", options.changes.largest},
+      {"simplify", options.changes.simplify},
+      {"simplify_error", simplified.error},
+      {"vertices", written.num_vertices},
+      {"triangles", written.num_triangles},
       {"listed_blocks", stats.listed_blocks},
       {"needed_blocks", stats.needed_blocks},
       {"decoded_blocks", stats.decoded_blocks},
@@ -112,6 +136,7 @@ void run_extract(ExtractArgs options) {
   options.extractor.vertices =
       options.vertices == "apart" ? VertexPlaces::kApart : VertexPlaces::kExact;
   options.extractor.stream = stream_place_from_string(options.stream);
+  check_changes(options.changes, options.extractor.vertices);
   if (options.level > 0) want_levels(options.compression);
 
   const ocl::DeviceInfo info = ocl::choose_device(options.device);
@@ -126,21 +151,28 @@ void run_extract(ExtractArgs options) {
   const CompressedVolume &level = level_of(volume, options.level);
   Extractor extractor(device, level, options.extractor);
   MeshFile file(options.output);
-  const ExtractStats stats = extractor.extract(drawn_isovalue(volume, *options.isovalue), file,
-                                               make_progress_bar("extracting"));
+  Counted written(file);
+  ExtractStats stats;
+  const float isovalue = drawn_isovalue(volume, *options.isovalue);
+  const SimplifiedMesh simplified = give_changed(
+      level, isovalue, options.extractor.vertices, options.changes, written, [&](MeshSink &sink) {
+        stats = extractor.extract(isovalue, sink, make_progress_bar("extracting"));
+      });
   compiling.finish();
   file.commit(make_progress_bar("writing"));
   fmt::print("isovalue {}: {} vertices, {} triangles; {} blocks decoded, {:.1f} ms\n",
-             *options.isovalue, with_commas(stats.size.num_vertices),
-             with_commas(stats.size.num_triangles), with_commas(stats.decoded_blocks),
+             *options.isovalue, with_commas(written.size.num_vertices),
+             with_commas(written.size.num_triangles), with_commas(stats.decoded_blocks),
              stats.total_ms);
+  if (options.changes.simplify < 1) fmt::print("{}\n", describe(simplified));
   warn_of_isovalue(volume, *options.isovalue);
   if (const std::string notice = file.notice(); !notice.empty()) warn(notice);
   fmt::print("wrote {}: {} bytes; device memory: peak {:.1f} MiB{}\n", one_line(options.output),
              with_commas(OutputGroup::current()->bytes_of(options.output)),
              double(device.ledger().peak()) / (1 << 20),
              names_output ? "; --output names another file" : "");
-  if (!options.stats.empty()) write_json(stats_json(options, level, device, stats), options.stats);
+  if (!options.stats.empty())
+    write_json(stats_json(options, level, device, stats, written.size, simplified), options.stats);
 }
 
 }  // namespace
@@ -178,6 +210,18 @@ void add_extract(CLI::App &app) {
           "every triangle has an area) or exact (at the isovalue, even on a voxel)")
       ->check(CLI::IsMember({"apart", "exact"}))
       ->capture_default_str();
+  command->add_flag("--closed", options->changes.closed,
+                    "closes the surface by flat caps in the faces of the volume's box, as printers "
+                    "want it");
+  command
+      ->add_option("--largest", options->changes.largest,
+                   "keeps so many parts of the surface, those with the largest areas [all]")
+      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 32));
+  command
+      ->add_option("--simplify", options->changes.simplify,
+                   "share of the triangles that is left, above 0, up to 1; prints the error. This "
+                   "and --largest hold the whole surface in memory [1]")
+      ->check(CLI::Range(1e-9, 1.0));
   command->add_option("--device", options->device,
                       "device: index, cpu, gpu, or a part of its name (see `isowave devices`)");
   add_volume_options(*command, options->volume);
@@ -204,7 +248,7 @@ void add_extract(CLI::App &app) {
                       "file for JSON statistics: blocks, batches, times, device memory");
   group_options(*command, "Options of every day",
                 {"--help", "--isovalue", "--output", "--level", "--normals", "--vertices",
-                 "--device", "--stats"});
+                 "--closed", "--largest", "--simplify", "--device", "--stats"});
   group_volume_options(*command);
   group_compression_options(*command);
   group_options(*command, "Memory", {"--memory-budget", "--cache-slots", "--stream"});

@@ -144,13 +144,16 @@ nb::object sample(const PyVolume &self, std::uint64_t max_voxels) {
 }
 
 nb::dict extract(const PyVolume &self, const std::string &device, double isovalue,
-                 std::uint32_t level, bool normals, bool exact_vertices,
-                 std::uint64_t memory_budget, const std::optional<nb::callable> &progress) {
+                 std::uint32_t level, bool normals, bool exact_vertices, bool closed,
+                 std::uint64_t largest, std::uint64_t memory_budget,
+                 const std::optional<nb::callable> &progress) {
   Callbacks callbacks;
   isowave::ExtractOptions options{
       .level = level,
       .with_normals = normals,
       .vertices = exact_vertices ? isowave::VertexPlaces::kExact : isowave::VertexPlaces::kApart,
+      .closed = closed,
+      .largest = largest,
       .memory_budget = memory_budget};
   options.progress = [&](std::string_view what, double done) {
     const bool goes_on = callbacks.run([&] {
@@ -247,7 +250,7 @@ void add_volumes(nb::module_ &m) {
           [](const PyVolume &v, const std::filesystem::path &path) { v.volume->save(path); },
           "path"_a, nb::call_guard<WithoutGil>())
       .def("extract", &extract, "device"_a, "isovalue"_a, "level"_a, "normals"_a,
-           "exact_vertices"_a, "memory_budget"_a, "progress"_a.none());
+           "exact_vertices"_a, "closed"_a, "largest"_a, "memory_budget"_a, "progress"_a.none());
   m.def("save_mesh", &save_mesh, "vertices"_a, "faces"_a, "normals"_a.none(), "path"_a);
   m.def("compress", &compress, "read"_a, "voxels"_a, "options"_a, "keep"_a, "path"_a.none(),
         "progress"_a.none());

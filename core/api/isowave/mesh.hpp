@@ -26,6 +26,15 @@ struct ExtractOptions {
   std::uint32_t level = 0;   ///< level of detail; 0: the volume itself
   bool with_normals = true;  ///< computes normals, which need more blocks around the surface
   VertexPlaces vertices = VertexPlaces::kApart;
+  /// Closes the mesh by flat caps in the faces of the volume's box, as if values lay below the
+  /// isovalue all around it: for printing, and volumes. Not with voxels without data and kExact.
+  bool closed = false;
+  /// Keeps so many parts of the mesh, those with the largest areas; parts hang together by common
+  /// vertices. 0: all. This and simplify take memory for the whole mesh.
+  std::uint64_t largest = 0;
+  /// About this share of the triangles is left, (0,1], by meshoptimizer; more if the error would be
+  /// a tenth of the mesh. Vertices that are left stay in place, and closed meshes closed. 1: all.
+  double simplify = 1;
   /// Bound on the device's memory; on the host, on value ranges and decoded blocks [bytes]. 0:
   /// three quarters of the device's memory, a quarter of the host's.
   std::uint64_t memory_budget = 0;
@@ -38,7 +47,7 @@ struct ExtractOptions {
 };
 
 /// Triangles that share their vertices. Each edge belongs to two triangles, except in the volume's
-/// border and beside voxels without data.
+/// border, unless the mesh was closed, and beside voxels without data.
 struct Mesh {
   /// Positions in world space; rounded if Volume::float32_positions().
   std::vector<Vector3> vertices{};
@@ -47,6 +56,8 @@ struct Mesh {
   std::vector<std::array<float, 3>> normals{};
   /// Numbers of vertices, counter-clockwise seen from where values are lower.
   std::vector<std::array<std::uint32_t, 3>> triangles{};
+  /// About the largest distance from the mesh before it was simplified [world units].
+  double simplify_error = 0;
 };
 
 /// Extracts the isosurface by marching cubes on the host, and waits for it: the mesh that a device
@@ -54,7 +65,8 @@ struct Mesh {
 ///
 /// options  cache_blocks must be 0
 /// Throws   Error: NaN, an unknown level, a budget that is too small (names one that is enough),
-///          2^32 vertices and more
+///          2^32 vertices and more; a mesh that cannot be closed; a share out of range, or a build
+///          without meshoptimizer
 Mesh extract(const std::shared_ptr<const Volume> &volume, double isovalue,
              const ExtractOptions &options = {});
 
@@ -64,8 +76,8 @@ Mesh extract(const std::shared_ptr<const Volume> &volume, double isovalue,
 ///
 /// path     ends in .ply, .stl, .obj, .vtp, .gltf or .glb. Positions that float32 does not hold are
 ///          float64 in .ply, .obj and .vtp, and relative to a node's translation in glTF
-/// Returns  a line for users, or nothing. STL has only float32: far from the origin, the line and
-///          the file's header say what to add to its positions
+/// Returns  a line for users, or nothing: what simplify did; STL has only float32, and far from the
+///          origin the line and the file's header say what to add to its positions
 /// Throws   Error: as above; the file cannot be written, or the format does not hold so much
 std::string extract_to_file(const std::shared_ptr<const Volume> &volume, double isovalue,
                             const std::filesystem::path &path, const ExtractOptions &options = {});

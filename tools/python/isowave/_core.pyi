@@ -79,6 +79,8 @@ class Volume:
         level: int,
         normals: bool,
         exact_vertices: bool,
+        closed: bool,
+        largest: int,
         memory_budget: int,
         progress: Callable[[str, float], object] | None,
     ) -> dict[str, NDArray[Any]]: ...

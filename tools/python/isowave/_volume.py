@@ -299,6 +299,8 @@ class Volume(Voxels):
         level: int = 0,
         normals: bool = True,
         vertices: str = "apart",
+        closed: bool = False,
+        largest: int | None = None,
         device: str | int | None = None,
         memory_budget: int | None = None,
         progress: Callable[[str, float], object] | None = None,
@@ -322,6 +324,11 @@ class Volume(Voxels):
             "apart": at least 1/1024 of an edge away from voxels, so that every triangle has an
             area, and programs that merge vertices by position find the mesh closed. "exact": where
             the field equals the isovalue; vertices meet on a voxel that equals it.
+        closed
+            Closes the surface by flat caps in the faces of the volume's box, as printers want it:
+            as if values lay below the isovalue all around. Not with voxels without data.
+        largest
+            Keeps so many parts of the surface, those with the largest areas. None: all.
         device
             "gpu", "cpu", an index, or a part of a name; None: $ISOWAVE_DEVICE, else the first GPU,
             else an OpenCL device for the CPU.
@@ -340,6 +347,8 @@ class Volume(Voxels):
             self._checked(level),
             flag("normals", normals),
             vertices == "exact",
+            flag("closed", closed),
+            0 if largest is None else whole("largest", largest, 2**32, least=1),
             0 if memory_budget is None else whole("memory_budget", memory_budget, 2**64 - 1),
             function("progress", progress),
         )
