@@ -69,6 +69,24 @@ TEST_F(CliExtract, EveryFormatAndOption) {
   }
 }
 
+/// As admesh judges, which merges vertices by position.
+TEST_F(CliExtract, ClosedMeshesAreWatertight) {
+  const auto file = folder_ / "a.stl";
+  const auto judge = [&] { return run_command("admesh " + quoted(file)).out; };
+  const auto open = testing::ContainsRegex("Total disconnected facets +: +[1-9]");
+  const auto closed = testing::ContainsRegex("Total disconnected facets +: +0 ");
+  extract("-o " + quoted(file));
+  EXPECT_THAT(judge(), open);
+  const nlohmann::json whole = extract("--closed -o " + quoted(file));
+  EXPECT_THAT(judge(), testing::AllOf(closed, testing::ContainsRegex("Facets reversed +: +0")));
+  EXPECT_TRUE(whole["closed"]);
+  const nlohmann::json less = extract("--closed --largest 1 --simplify 0.25 -o " + quoted(file));
+  EXPECT_THAT(judge(), testing::AllOf(closed, testing::ContainsRegex("Number of parts +: +1 ")));
+  EXPECT_NEAR(less["triangles"].get<double>() / whole["triangles"].get<double>(), 0.25, 0.02);
+  EXPECT_GT(less["simplify_error"], 0);
+  EXPECT_EQ(std::filesystem::file_size(file), 84 + 50 * less["triangles"].get<std::size_t>());
+}
+
 TEST_F(CliExtract, TheNameIsMadeUp) {
   const ProgramResult result =
       run_command("cd " + quoted(folder_.path()) + " && " + test::isowave_program() + " extract " +
@@ -158,7 +176,8 @@ TEST_F(CliExtract, WrongInputIsOneLine) {
   for (const auto &[arguments, text] :
        {std::pair(" --level 9", "--level 9"),
         {" --memory-budget 10kB", "a memory budget of 10000 bytes is too small"},
-        {" --cache-slots 9", "a block of the surface needs 17"}}) {
+        {" --cache-slots 9", "a block of the surface needs 17"},
+        {" --closed --vertices exact", "leave out exact vertices"}}) {
     const ProgramResult result = run_isowave(fuel + " -i 10" + arguments + ply);
     EXPECT_EQ(result.status, 1) << arguments;
     EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;

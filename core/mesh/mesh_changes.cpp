@@ -65,10 +65,48 @@ void drop_unused(Mesh &mesh) {
   }
 }
 
+/// The ends of edges that two triangles run along in the same way.
+std::vector<bool> ends_of_shared_edges(const std::vector<Triangle> &triangles,
+                                       std::size_t num_vertices) {
+  std::vector<std::uint64_t> edges;
+  edges.reserve(3 * triangles.size());
+  for (const Triangle &triangle : triangles) {
+    for (std::size_t i = 0; i < 3; ++i)
+      edges.push_back(std::uint64_t{triangle[i]} << 32 | triangle[(i + 1) % 3]);
+  }
+  std::ranges::sort(edges);
+  std::vector<bool> ends(num_vertices);
+  for (std::size_t i = 1; i < edges.size(); ++i) {
+    if (edges[i] == edges[i - 1]) ends[edges[i] >> 32] = ends[edges[i] & 0xFFFFFFFF] = true;
+  }
+  return ends;
+}
+
+/// Simplifies what is not kept, whose border stays.
+///
+/// places  [vertex] float32
+/// error   gets that of meshoptimizer
+std::vector<Triangle> simplified(const std::vector<glm::vec3> &places,
+                                 const std::vector<Triangle> &triangles,
+                                 const std::vector<bool> &kept, std::size_t target, float *error) {
+  constexpr float kMostError = 0.1f;  // of the mesh's extent
+  std::vector<Triangle> fixed, rest;
+  for (std::size_t i = 0; i < triangles.size(); ++i)
+    (kept[i] ? fixed : rest).push_back(triangles[i]);
+  if (rest.empty()) return fixed;
+  std::vector<Triangle> left(rest.size());
+  const std::size_t wanted = target > fixed.size() ? target - fixed.size() : 0;
+  const std::size_t num_indices = meshopt_simplify(
+      left.data()->data(), rest.data()->data(), 3 * rest.size(), &places[0].x, places.size(),
+      sizeof(glm::vec3), 3 * wanted, kMostError, meshopt_SimplifyLockBorder, error);
+  left.resize(num_indices / 3);
+  left.insert(left.end(), fixed.begin(), fixed.end());
+  return left;
+}
+
 }  // namespace
 
 SimplifiedMesh simplify(Mesh &mesh, double share) {
-  constexpr float kMostError = 0.1f;  // of the mesh's extent
   SimplifiedMesh result{mesh.triangles.size(), mesh.triangles.size()};
   if (mesh.triangles.empty()) return result;
   glm::dvec3 least = mesh.vertices.front(), largest = least;
@@ -80,13 +118,18 @@ SimplifiedMesh simplify(Mesh &mesh, double share) {
   places.reserve(mesh.vertices.size());
   for (const glm::dvec3 &vertex : mesh.vertices)
     places.emplace_back(vertex - 0.5 * (least + largest));
-  const auto target = static_cast<std::size_t>(share * double(mesh.triangles.size())) * 3;
-  std::vector<Triangle> left(mesh.triangles.size());
+  const auto target = static_cast<std::size_t>(share * double(mesh.triangles.size()));
+  // Where meshoptimizer makes four triangles meet in an edge, what was there is kept.
+  std::vector<bool> kept(mesh.triangles.size());
+  std::vector<Triangle> left;
   float error = 0;
-  const std::size_t num_indices = meshopt_simplify(
-      left.data()->data(), mesh.triangles.data()->data(), 3 * mesh.triangles.size(), &places[0].x,
-      places.size(), sizeof(glm::vec3), target, kMostError, meshopt_SimplifyLockBorder, &error);
-  left.resize(num_indices / 3);
+  for (bool all_apart = false; !all_apart;) {
+    left = simplified(places, mesh.triangles, kept, target, &error);
+    const std::vector<bool> ends = ends_of_shared_edges(left, mesh.vertices.size());
+    all_apart = std::ranges::find(ends, true) == ends.end();
+    for (std::size_t i = 0; i < kept.size(); ++i)
+      kept[i] = kept[i] || std::ranges::any_of(mesh.triangles[i], [&](auto v) { return ends[v]; });
+  }
   mesh.triangles = std::move(left);
   result.after = mesh.triangles.size();
   result.error =

@@ -58,7 +58,7 @@ const CompressedVolume &level_of(const CompressedVolume &volume, std::uint32_t l
 class Counted : public MeshSink {
  public:
   explicit Counted(MeshSink &inner) : inner_(inner) {}
-  void begin(const MeshSize &size) override { inner_.begin(size); }
+  void begin(const MeshSize &of_mesh) override { inner_.begin(of_mesh); }
   void add(const MeshPart &part) override {
     size.num_vertices += part.vertices.size();
     size.num_triangles += part.triangles.size();

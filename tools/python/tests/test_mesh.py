@@ -136,6 +136,34 @@ def test_budget_level_and_normals():
     assert 0 < len(coarse.faces) < len(mesh.faces) / 2
 
 
+def test_closed_meshes_and_their_largest_parts():
+    x, y, z = np.meshgrid(*(np.arange(n, dtype=np.float32) for n in (30, 20, 24)), indexing="ij")
+    balls = np.minimum(
+        np.sqrt((x - 2) ** 2 + (y - 9) ** 2 + (z - 11) ** 2),
+        np.sqrt((x - 20) ** 2 + (y - 9) ** 2 + (z - 11) ** 2) - 2,
+    )
+    volume = isowave.compress(10 - balls.transpose(2, 1, 0), tolerance=1e-4)
+
+    def volume_of(mesh):
+        a, b, c = (mesh.vertices[mesh.faces[:, i]].astype(np.float64) for i in range(3))
+        return (a * np.cross(b, c)).sum() / 6
+
+    def is_watertight(mesh):
+        edges = np.concatenate([mesh.faces[:, [i, (i + 1) % 3]] for i in range(3)])
+        return {*map(tuple, edges)} == {(b, a) for a, b in edges.tolist()}
+
+    assert not is_watertight(volume.extract(5))
+    closed = volume.extract(5, closed=True)
+    assert is_watertight(closed)
+    largest = volume.extract(5, closed=True, largest=1)
+    ball = 4 / 3 * np.pi * 7**3
+    assert is_watertight(largest) and abs(volume_of(largest) / ball - 1) < 0.02
+    cut = 4 / 3 * np.pi * 5**3 - np.pi * 3**2 * (3 * 5 - 3) / 3  # a cap of height 3 is missing
+    assert abs((volume_of(closed) - volume_of(largest)) / cut - 1) < 0.04
+    with pytest.raises(isowave.Error, match="leave out exact vertices"):
+        volume.extract(5, closed=True, vertices="exact")
+
+
 def test_vertices_are_apart_unless_asked_for_exactly():
     """Integers, many at the isovalue: what merges vertices by position finds the mesh closed."""
     volume = isowave.compress(noise((9, 10, 11), 7, values=4).astype(np.uint8), exact=True)
