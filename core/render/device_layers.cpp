@@ -156,7 +156,7 @@ LayerCounts DeviceRenderer::draw_layer(std::uint32_t layer, const FrameRequest &
   if (is_smooth) run(is_further ? static_cast<Wave &>(*layer_normals_) : normals_of_camera_, frame);
   if (has_field) {
     field_->set_layer(is_further ? &*layers_ : nullptr);
-    run(*field_, frame);
+    read_field(request, frame);
   }
   // Hits of a stopped frame may have the values of the layer before. The first layer has none.
   if (is_further && frame.stats.cancelled) rays_.field_values.fill(no_value());

@@ -9,6 +9,7 @@
 
 #include "core/base/error.hpp"
 #include "core/base/ms_since.hpp"
+#include "core/frame/field_values.hpp"
 #include "core/ocl/in_process.hpp"
 #include "core/render/picture_so_far.hpp"
 #include "core/render/stall_guard.hpp"
@@ -23,11 +24,13 @@ namespace isowave::core {
 namespace {
 
 /// Slots that the frame has freed of blocks that it had requested itself.
-std::uint64_t recycled_blocks(const FrameStats &stats) {
+///
+/// shares_field  blocks for values of a field were among them
+std::uint64_t recycled_blocks(const FrameStats &stats, bool shares_field = false) {
   std::uint64_t sum = stats.normals.recycled_blocks + stats.behind.recycled_blocks +
                       stats.slices.recycled_blocks + stats.ambient.recycled_blocks;
   for (const PassStats &pass : stats.passes) sum += pass.counts.recycled_count;
-  return sum;
+  return shares_field ? sum + stats.field.recycled_blocks : sum;
 }
 
 /// Columns of the picture that a list of rays is seen as.
@@ -75,10 +78,10 @@ FrameStats DeviceRenderer::render(const FrameRequest &request) {
   } else {
     draw_layers(request, frame);
   }
-  if (has_field_values_) run(*field_, frame);
+  if (has_field_values_) read_field(request, frame);
   FrameStats &stats = frame.stats;
   if (request.surfaces.empty() && light_rays.count() != 0) light_surface(light_rays, frame);
-  blocks_.close(recycled_blocks(stats), stats.cancelled);
+  blocks_.close(recycled_blocks(stats, blocks_.plan.field.shares_blocks), stats.cancelled);
   rays_.frame = blocks_.levels[0].frame;  // for shading
   const Uploads after = blocks_.uploads();
   stats.uploaded_blocks = after.blocks - before.blocks;
@@ -100,6 +103,15 @@ void DeviceRenderer::draw_surface(const FrameRequest &request, Frame &frame) {
   blocks_.counts_touched = false;
   took_one_pass = frame.stats.passes.size() == 1;
   if (is_smooth) run(normals_of_camera_, frame);
+}
+
+/// Gives hits the values of the field: those of all bit planes, also if the frame draws fewer.
+void DeviceRenderer::read_field(const FrameRequest &request, Frame &frame) {
+  if (frame.stats.cancelled) return;
+  const bool draws_others = blocks_.plan.field.shares_blocks && !draws_own_values(request);
+  if (draws_others) blocks_.go_on_with(decoded_values({}));
+  run(*field_, frame);
+  if (draws_others) blocks_.go_on_with(decoded_values(request));
 }
 
 /// Runs the passes of one wave until none of its rays is left, or on_pass says to stop. Does
@@ -227,10 +239,10 @@ DeviceRenderer::DeviceRenderer(ocl::Device &device, const CompressedVolume &volu
   }
   if (options_.with_bounce) bounce_.emplace(device, rays_.num_rays, blocks_.levels.size() > 1);
   if (options_.field != nullptr) {
-    field_.emplace(device, *options_.field, options_.field == &volume, levels(), plan.field,
+    field_.emplace(*options_.field, options_.field == &volume, blocks_, levels(), plan.field,
                    options_.group_size, rays_);
     blocks_.on_reset = [this] { field_->clear(); };
-    field_->own_blocks()->on_reset = [this] { blocks_.clear(); };
+    if (BlockStore *own = field_->own_blocks()) own->on_reset = [this] { blocks_.clear(); };
   }
   options_.cache_slots = plan.cache_slots;
   options_.stream = plan.stream;
@@ -278,7 +290,7 @@ void DeviceRenderer::compile_kernels() {
       wave->begin();
       for (int pass = 0; pass < 2; ++pass) wave->enqueue_pass();  // the first decodes nothing
       blocks_.forget_requests();
-      if (field_) field_->own_blocks()->forget_requests();
+      if (field_ && field_->own_blocks()) field_->own_blocks()->forget_requests();
       if (behind_ && wave == &*behind_) layers_->swap_hits(rays, 0);
     }
   }
