@@ -39,20 +39,21 @@ CompressedVolume volume_with_bounds() {
       .volume;
 }
 
-/// Clipped with caps; the same of caps alone, with gradients of cells and ambient rays; levels of
-/// detail; fewer bit planes, with ambient rays behind the values; a bound; the first again.
+/// Clipped with caps; the same of caps alone, with gradients of cells and ambient rays; two
+/// isovalues of fewer bit planes, with ambient rays behind the values; levels of detail, and the
+/// same of fewer bit planes; a bound; the first again.
 std::vector<FrameRequest> requests(const VolumeInfo &info) {
-  std::vector<FrameRequest> all(7, request_of(info));
+  std::vector<FrameRequest> all(8, request_of(info));
   all[1].field_on_caps = true;
   all[1].normals = Normals::kCell;
   all[1].ambient_rays = 3;
-  all[2].voxel_pixels = 3;
-  all[3].voxel_error = kVoxelError;
-  all[3].ambient_rays = 2;
-  all[4].voxel_pixels = 2;
-  all[4].voxel_error = kVoxelError;
-  all[5].clip = {};
-  all[5].bound = FieldBound::kUpper;
+  all[2].voxel_error = all[3].voxel_error = all[5].voxel_error = kVoxelError;
+  all[2].ambient_rays = all[3].ambient_rays = 2;
+  all[3].isovalue = -0.3f;
+  all[4].voxel_pixels = 30;  // none of the finest
+  all[5].voxel_pixels = 2;
+  all[6].clip = {};
+  all[6].bound = FieldBound::kUpper;
   return all;
 }
 
@@ -109,6 +110,7 @@ TEST(OwnField, FramesOfTheHostAreThoseOfASecondVolume) {
     HostRenderer shares(volume, {.memory_limit = limit, .field = &volume}),
         separate(volume, {.field = &copy});
     expect_same_values(shares, separate, requests(volume.info));
+    EXPECT_GT(shares.render(requests(volume.info)[4]).first_level, 0u);
     expect_same_values(shares, separate, layered_requests(volume.info));
   }
 }
@@ -221,11 +223,10 @@ TEST_P(OwnFieldOnDevice, FramesAreThoseOfASecondVolume) {
 /// So few slots that hits wait for blocks, also of a level of detail that the frame does not draw.
 TEST_P(OwnFieldOnDevice, FramesOfFewSlotsAreThoseOfASecondVolume) {
   const CompressedVolume volume = volume_with_bounds();
-  std::vector<FrameRequest> frames = requests(volume.info);
-  frames.erase(frames.begin() + 5);  // without bounds
+  const std::vector<FrameRequest> all = requests(volume.info), frames{all[0], all[2], all[4]};
   for (const StreamPlace place : {StreamPlace::kDevice, StreamPlace::kHost})
     expect_values_of_a_copy(
-        volume, {.cache_slots = 16, .stream = place, .with_levels = true, .with_given_rays = true},
+        volume, {.cache_slots = 24, .stream = place, .with_levels = true, .with_given_rays = true},
         frames);
 }
 
@@ -262,7 +263,7 @@ TEST_P(OwnFieldOnDevice, StoppedFramesLeaveNothing) {
   DeviceRenderer renderer(
       device_, volume, {.size = kSize, .cache_slots = 16, .with_levels = true, .field = &volume});
   std::size_t in_field = 0;
-  for (const std::size_t of : {std::size_t{2}, std::size_t{3}}) {
+  for (const std::size_t of : {std::size_t{4}, std::size_t{2}}) {
     FrameRequest request = requests(volume.info)[of];
     request.ambient_rays = 0;
     host.render(request);
