@@ -9,7 +9,6 @@
 
 #include "core/base/error.hpp"
 #include "core/base/ms_since.hpp"
-#include "core/frame/field_values.hpp"
 #include "core/ocl/in_process.hpp"
 #include "core/render/picture_so_far.hpp"
 #include "core/render/stall_guard.hpp"
@@ -104,15 +103,6 @@ void DeviceRenderer::draw_surface(const FrameRequest &request, Frame &frame) {
   blocks_.counts_touched = false;
   took_one_pass = frame.stats.passes.size() == 1;
   if (is_smooth) run(normals_of_camera_, frame);
-}
-
-/// Gives hits the values of the field: those of all bit planes, also if the frame draws fewer.
-void DeviceRenderer::read_field(const FrameRequest &request, Frame &frame) {
-  if (frame.stats.cancelled) return;
-  const bool draws_others = blocks_.plan.field.shares_blocks && !draws_own_values(request);
-  if (draws_others) blocks_.go_on_with(decoded_values({}));
-  run(*field_, frame);
-  if (draws_others) blocks_.go_on_with(decoded_values(request));
 }
 
 /// Runs the passes of one wave until none of its rays is left, or on_pass says to stop. Does
