@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -76,6 +77,32 @@ TEST_F(CliColorBy, AFieldColoursTheSurface) {
   EXPECT_THAT(result.out, testing::HasSubstr("values of the field at the hits: "));
   EXPECT_EQ(draw("--color-by volume"), draw("")) << "there are no caps";
   EXPECT_EQ(draw("--color-by volume --color red"), draw("--color red"));
+}
+
+/// The volume's own file, by its name, is the drawn volume: its memory is taken once.
+TEST_F(CliColorBy, AFieldOfTheVolumesFileTakesNoFurtherBlocks) {
+  const std::filesystem::path file = folder_ / "a.zfp", copy = folder_ / "b.zfp";
+  const auto made = test::run_isowave("convert " + kVolume + " -o " + quoted(file));
+  ASSERT_EQ(made.status, 0) << made.err;
+  std::filesystem::copy_file(file, copy);
+  std::set<std::string> pictures;
+  const auto peak_with = [&](const std::string &options) {
+    const std::string out = quoted(folder_ / "a.png"), stats = quoted(folder_ / "s.json");
+    const auto result =
+        test::run_isowave("render " + quoted(file) + " -i 80 --size 48x36 " + options +
+                          " --device cpu -o " + out + " --stats " + stats);
+    EXPECT_EQ(result.status, 0) << result.err;
+    pictures.insert(test::read_file(folder_ / "a.png"));
+    const auto json = nlohmann::json::parse(test::read_file(folder_ / "s.json"));
+    return json["memory"]["peak"].get<std::uint64_t>();
+  };
+  const std::uint64_t without = peak_with("");
+  pictures.clear();
+  const std::string by = "--clip=-1,0,0,-20 --color-by ";
+  const std::uint64_t shared = peak_with(by + quoted(folder_ / "." / "a.zfp"));
+  EXPECT_GT(peak_with(by + quoted(copy)), shared + std::filesystem::file_size(file) / 2);
+  EXPECT_EQ(pictures.size(), 1u);
+  EXPECT_LT(shared, without + 48 * 36 * 4 + 1000);
 }
 
 /// Also of several and translucent surfaces, which may keep their own colours, and beside slices.

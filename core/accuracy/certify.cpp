@@ -286,6 +286,7 @@ Certificate certify(Renderer &renderer, const CompressedVolume &volume, const Fr
     FrameRequest of_bound = without_light_rays(request);
     of_bound.normals = Normals::kCell;
     of_bound.bound = bound;
+    of_bound.field_values = false;
     of_bound.on_pass = {};
     for (const PassStats &pass : renderer.render(of_bound).passes)
       decoded_blocks += pass.counts.decoded_count;

@@ -96,6 +96,7 @@ class Judge {
         by_(by) {
     request_.normals = Normals::kCell;
     request_.size = size_;
+    request_.field_values = false;
     request_.on_pass = {};
     const View view = make_view(levels_.front(), request.camera, size_);
     for (std::uint32_t ray = 0; ray < size_.num_rays(); ++ray) {

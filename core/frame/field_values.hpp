@@ -18,6 +18,12 @@ namespace isowave::core {
 /// Throws  Error: a volume's directions do not span space
 FieldMap make_field_map(std::span<const VolumeInfo> levels, const VolumeInfo &field);
 
+/// Whether the frame has blocks of the finest level decoded to the volume's own values, which a
+/// field has.
+inline bool draws_own_values(const FrameRequest &request) {
+  return request.voxel_error == 0 && request.bound == FieldBound::kNone;
+}
+
 /// What hits of a frame read of a field.
 struct FieldReading {
   FieldMap map{};

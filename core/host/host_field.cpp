@@ -31,19 +31,39 @@ float value_at_hit(const FieldMap &map, const FrameParams &grid, const HostField
   return value_of_hit(&map, label_table, hit, corners, place.at);
 }
 
-HostFieldValues::HostFieldValues(const CompressedVolume &field, bool is_own,
+HostFieldValues::HostFieldValues(const CompressedVolume &field, HostBlocks *drawn,
                                  std::span<const VolumeInfo> levels, HostRoom &room,
                                  std::uint32_t num_threads)
-    : range_(known_range(field)),
-      is_own_(is_own),
+    : field_(field),
+      drawn_(drawn),
+      room_(room),
+      num_threads_(num_threads),
+      range_(known_range(field)),
       map_(make_field_map(levels, field.info)),
       reading_{map_},
-      grid_(make_grid_params(field.info)),
-      blocks_(field, room, num_threads),
-      decoded_((blocks_.select(0), blocks_.field())) {}
+      grid_(make_grid_params(field.info)) {
+  if (drawn == nullptr) own();
+}
+
+HostBlocks &HostFieldValues::own() {
+  if (!own_) own_ = std::make_unique<HostBlocks>(field_, room_, num_threads_);
+  return *own_;
+}
+
+/// Whether the frame decodes the drawn volume's blocks to the values of the field.
+bool HostFieldValues::shares_in(const FrameRequest &request) const {
+  return drawn_ != nullptr && draws_own_values(request);
+}
+
+std::uint64_t HostFieldValues::own_bytes(const FrameRequest &request) const {
+  return own_ || !shares_in(request) ? HostBlocks::bytes(field_.info) : 0;
+}
 
 void HostFieldValues::begin_frame(const FrameRequest &request) {
-  reading_ = reading_of(request, map_, is_own_);
+  reading_ = reading_of(request, map_, drawn_ != nullptr);
+  HostBlocks &blocks = shares_in(request) ? *drawn_ : own();
+  blocks.decode_as(HostValues(field_));
+  decoded_ = blocks.field();
 }
 
 void HostFieldValues::operator()(std::span<const HitRecord> hits, float *values) const {

@@ -1,6 +1,7 @@
 #pragma once
-// Values of a second volume, the field, at hits on the host.
+// Values of a field at hits on the host: of a second volume, or of the volume that is drawn.
 
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -21,29 +22,43 @@ float value_at_hit(const FieldMap &map, const FrameParams &grid, const HostField
 class HostFieldValues {
  public:
   /// field   must outlive this
-  /// is_own  it is the volume that is drawn
+  /// drawn   if the field is the volume that is drawn, its finest level, whose blocks it shares; it
+  ///         has its own from the first frame of fewer bit planes on. Null: it always has. Must
+  ///         outlive this
   /// levels  of the volume that is drawn
   /// room    must outlive this
   /// Throws  Error: as HostBlocks
-  HostFieldValues(const CompressedVolume &field, bool is_own, std::span<const VolumeInfo> levels,
-                  HostRoom &room, std::uint32_t num_threads);
+  HostFieldValues(const CompressedVolume &field, HostBlocks *drawn,
+                  std::span<const VolumeInfo> levels, HostRoom &room, std::uint32_t num_threads);
 
-  /// A frame begins.
+  /// Memory of its own blocks in such a frame, without decoded ones.
+  std::uint64_t own_bytes(const FrameRequest &request) const;
+  /// A frame begins, whose levels and surfaces are open.
+  ///
+  /// Throws  Error: as HostBlocks
   void begin_frame(const FrameRequest &request);
   /// values[i]: that of hits[i]. Within HostRoom::run().
   void operator()(std::span<const HitRecord> hits, float *values) const;
-  void forget() { blocks_.forget(); }
+  void forget() {
+    if (own_) own_->forget();
+  }
   /// As known_range() of the field.
   std::optional<std::array<float, 2>> volume_range() const { return range_; }
 
  private:
+  bool shares_in(const FrameRequest &request) const;
+  HostBlocks &own();
+
+  const CompressedVolume &field_;
+  HostBlocks *drawn_;  ///< null: the field is a second volume
+  HostRoom &room_;
+  std::uint32_t num_threads_;
   std::optional<std::array<float, 2>> range_;
-  bool is_own_;
   FieldMap map_;
   FieldReading reading_;
   FrameParams grid_;
-  HostBlocks blocks_;
-  HostField decoded_;
+  std::unique_ptr<HostBlocks> own_{};
+  HostField decoded_{};  ///< of the frame at work
 };
 
 }  // namespace isowave::core

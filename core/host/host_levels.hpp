@@ -29,6 +29,7 @@ class HostLevels {
   /// Grids of all levels, the finest first.
   const std::vector<VolumeInfo> &infos() const { return infos_; }
   const HostBlocks &finest() const { return *blocks_.front(); }
+  HostBlocks &finest() { return *blocks_.front(); }
 
   /// Prepares the levels that draw a frame.
   ///

@@ -85,9 +85,10 @@ HostRenderer::HostRenderer(const CompressedVolume &volume, const HostRendererOpt
   abilities_.largest = options.largest;
   if (options.field != nullptr) {
     check_volume_info(options.field->info, "the field");
-    checked_limit(volume, memory_limit_, 1, HostBlocks::bytes(options.field->info));
-    field_.emplace(*options.field, options.field == &volume, levels_.infos(), levels_.room(),
-                   num_threads_);
+    const bool is_own = options.field == &volume;
+    if (!is_own) checked_limit(volume, memory_limit_, 1, HostBlocks::bytes(options.field->info));
+    field_.emplace(*options.field, is_own ? &levels_.finest() : nullptr, levels_.infos(),
+                   levels_.room(), num_threads_);
     abilities_.field_labels = are_labels(*options.field);
     abilities_.field = true;
   }
@@ -115,7 +116,6 @@ FrameStats HostRenderer::render(const FrameRequest &request) {
   const std::vector<FrameParams> frames = make_level_frames(levels_.infos(), request.camera, size,
                                                             request.isovalue, request.voxel_pixels);
   FrameStats stats;
-  if (request.field_values) field_->begin_frame(request);
   if (request.surfaces.empty()) {
     draw_one(request, frames, size, stats);
   } else {
@@ -148,7 +148,9 @@ void HostRenderer::draw_picture(const FrameParams &frame, ImageSize size,
 /// The surface of one isovalue, by levels of detail.
 void HostRenderer::draw_one(const FrameRequest &request, std::span<const FrameParams> frames,
                             ImageSize size, FrameStats &stats) {
+  if (request.field_values) checked_limit(volume_, memory_limit_, 1, field_->own_bytes(request));
   std::vector<HostLevel> drawing = levels_.open(frames, request.voxel_error, request.bound);
+  if (request.field_values) field_->begin_frame(request);
   stats.first_level =
       static_cast<std::size_t>(std::ranges::find_if(frames, draws) - frames.begin());
   stats.last_level = stats.first_level + drawing.size() - 1;
@@ -173,15 +175,16 @@ void HostRenderer::draw_one(const FrameRequest &request, std::span<const FramePa
 std::vector<HostLevel> HostRenderer::open_surfaces(const FrameRequest &request,
                                                    const FrameParams &frame,
                                                    std::span<const std::uint32_t> order) {
+  const std::uint64_t of_field = request.field_values ? field_->own_bytes(request) : 0;
   if (!request.surfaces.front().labels.empty()) {
     check_labels(volume_);
     checked_limit(volume_, memory_limit_, 1,
-                  HostLevels::bytes_of_labels(info_, request.surfaces.size()));
+                  HostLevels::bytes_of_labels(info_, request.surfaces.size()) + of_field);
     std::vector<std::vector<std::uint16_t>> groups;
     for (const std::uint32_t number : order) groups.push_back(request.surfaces[number].labels);
     return levels_.open_labels(frame, groups);
   }
-  checked_limit(volume_, memory_limit_, request.surfaces.size());
+  checked_limit(volume_, memory_limit_, request.surfaces.size(), of_field);
   std::vector<float> isovalues;
   for (const std::uint32_t number : order) isovalues.push_back(request.surfaces[number].isovalue);
   return levels_.open_surfaces(frame, isovalues, request.voxel_error);
@@ -214,6 +217,7 @@ void HostRenderer::draw_surfaces(const FrameRequest &request, const FrameParams 
   for (const std::size_t place : light_order(request.surfaces))
     by.opaque[request.surfaces[by.numbers[place]].clipped ? 1 : 0].push_back(place);
   std::vector<HostLevel> surfaces = open_surfaces(request, frame, by.numbers);
+  if (has_field) field_->begin_frame(request);
   for (std::size_t k = 0; k < surfaces.size(); ++k) {
     if (request.surfaces[by.numbers[k]].clipped)
       clip_levels({&surfaces[k], 1}, by.clip, frame.screen);

@@ -186,6 +186,12 @@ void BlockStore::decode_as(const std::vector<DecodedValues> &values) {
   if (changes) clear();
 }
 
+void BlockStore::go_on_with(const std::vector<DecodedValues> &values) {
+  const std::optional surface = cached_surface_;
+  decode_as(values);
+  cached_surface_ = surface;  // that of the blocks that come next
+}
+
 void BlockStore::begin_host_pass(Wavefront &rays) {
   PassCounts counts{};
   counts.ray_count = 1;

@@ -76,6 +76,10 @@ class BlockStore {
   void open(Wavefront &rays, std::vector<FrameParams> frames,
             const std::vector<DecodedValues> &values, FieldBound bound, RaySource source);
 
+  /// Goes on with other decoded values within the frame at work: if others are cached, the cache is
+  /// cleared. Does not wait.
+  void go_on_with(const std::vector<DecodedValues> &values);
+
   /// Goes on with another surface of the frame at work, which one level of detail draws.
   ///
   /// selection  its selection of active blocks (MacrocellBuffers), 0: that of open()
@@ -109,6 +113,8 @@ class BlockStore {
 
   /// Call it after a pass that may have requested blocks was enqueued.
   void expect_requests() { asked_ = drawing; }
+  /// The same after a pass that has requested blocks of those levels.
+  void expect_requests(LevelRange of) { asked_ = of; }
   /// Call it if no ray is left that waits for a block.
   void forget_requests() { asked_.reset(); }
   /// Whether there may be requests that were not provided.

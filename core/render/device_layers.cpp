@@ -1,4 +1,4 @@
-// DeviceRenderer's frames of several and translucent surfaces.
+// DeviceRenderer's frames of several and translucent surfaces, and their colours by a field.
 
 #include <algorithm>
 #include <limits>
@@ -80,6 +80,15 @@ void DeviceRenderer::show_surface(const FrameRequest &request, const ClipParams 
   const std::uint32_t number = layers_->surface_at(place);
   rays_.set_clip(request.surfaces[number].clipped ? clip : ClipParams{});
   blocks_.show_surface(rays_, place, isovalue, number);
+}
+
+/// Gives hits the values of the field: those of all bit planes, also if the frame draws fewer.
+void DeviceRenderer::read_field(const FrameRequest &request, Frame &frame) {
+  if (frame.stats.cancelled) return;
+  const bool draws_others = blocks_.plan.field.shares_blocks && !draws_own_values(request);
+  if (draws_others) blocks_.go_on_with(decoded_values({}));
+  run(*field_, frame);
+  if (draws_others) blocks_.go_on_with(decoded_values(request));
 }
 
 /// Returns the number of surfaces that have hits: all, unless the frame is stopped.
@@ -191,7 +200,7 @@ LayerCounts DeviceRenderer::draw_layer(std::uint32_t layer, const FrameRequest &
   if (is_smooth) run(is_further ? static_cast<Wave &>(*layer_normals_) : normals_of_camera_, frame);
   if (has_field) {
     field_->set_layer(is_further ? &*layers_ : nullptr);
-    run(*field_, frame);
+    read_field(request, frame);
   }
   // Hits of a stopped frame may have the values of the layer before. The first layer has none.
   if (is_further && frame.stats.cancelled) rays_.field_values.fill(no_value());

@@ -23,11 +23,13 @@ namespace isowave::core {
 namespace {
 
 /// Slots that the frame has freed of blocks that it had requested itself.
-std::uint64_t recycled_blocks(const FrameStats &stats) {
+///
+/// shares_field  blocks for values of a field were among them
+std::uint64_t recycled_blocks(const FrameStats &stats, bool shares_field = false) {
   std::uint64_t sum = stats.normals.recycled_blocks + stats.behind.recycled_blocks +
                       stats.slices.recycled_blocks + stats.ambient.recycled_blocks;
   for (const PassStats &pass : stats.passes) sum += pass.counts.recycled_count;
-  return sum;
+  return shares_field ? sum + stats.field.recycled_blocks : sum;
 }
 
 /// Columns of the picture that a list of rays is seen as.
@@ -76,10 +78,10 @@ FrameStats DeviceRenderer::render(const FrameRequest &request) {
   } else {
     draw_layers(request, frame);
   }
-  if (has_field_values_) run(*field_, frame);
+  if (has_field_values_) read_field(request, frame);
   FrameStats &stats = frame.stats;
   if (request.surfaces.empty() && light_rays.count() != 0) light_surface(light_rays, frame);
-  blocks_.close(recycled_blocks(stats), stats.cancelled);
+  blocks_.close(recycled_blocks(stats, blocks_.plan.field.shares_blocks), stats.cancelled);
   rays_.frame = blocks_.levels[0].frame;  // for shading
   const Uploads after = blocks_.uploads();
   stats.uploaded_blocks = after.blocks - before.blocks;
@@ -230,10 +232,10 @@ DeviceRenderer::DeviceRenderer(ocl::Device &device, const CompressedVolume &volu
     bounce_.emplace(device, rays_.num_rays, blocks_.levels.size() > 1,
                     options_.max_surfaces != 0 ? rays_.num_rays : 0);
   if (options_.field != nullptr) {
-    field_.emplace(device, *options_.field, options_.field == &volume, levels(), plan.field,
+    field_.emplace(*options_.field, options_.field == &volume, blocks_, levels(), plan.field,
                    options_.group_size, rays_);
     blocks_.on_reset = [this] { field_->clear(); };
-    field_->own_blocks()->on_reset = [this] { blocks_.clear(); };
+    if (BlockStore *own = field_->own_blocks()) own->on_reset = [this] { blocks_.clear(); };
   }
   options_.cache_slots = plan.cache_slots;
   options_.stream = plan.stream;
@@ -285,7 +287,7 @@ void DeviceRenderer::compile_kernels() {
       wave->begin();
       for (int pass = 0; pass < 2; ++pass) wave->enqueue_pass();  // the first decodes nothing
       blocks_.forget_requests();
-      if (field_) field_->own_blocks()->forget_requests();
+      if (field_ && field_->own_blocks()) field_->own_blocks()->forget_requests();
       if (behind_ && wave == &*behind_) layers_->swap_hits(rays, 0);
     }
   }

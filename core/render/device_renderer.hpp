@@ -205,6 +205,7 @@ class DeviceRenderer : public Renderer {
   void count_last_round(std::uint32_t num_rounds, Frame &frame);
   void add_stage_times(LaterPasses &passes);
   void draw_surface(const FrameRequest &request, Frame &frame);
+  void read_field(const FrameRequest &request, Frame &frame);
   void choose_labels(const std::vector<SurfaceStyle> &surfaces);
   void draw_layers(const FrameRequest &request, Frame &frame);
   void show_surface(const FrameRequest &request, const ClipParams &clip, std::size_t place,

@@ -1,5 +1,6 @@
 #pragma once
-// A second volume on a device, the field, and the wave in which hits get its values.
+// The wave in which hits get values of a field: of a second volume, which has blocks of its own, or
+// of the volume that is drawn.
 
 #include <array>
 #include <optional>
@@ -14,15 +15,16 @@ namespace isowave::core {
 
 class FieldWave : public Wave {
  public:
-  /// Uploads the field, unless it stays on the host.
+  /// Uploads the field, unless it stays on the host, or shares the drawn volume's blocks.
   ///
   /// field   must outlive the wave if it stays on the host
   /// is_own  it is the volume that is drawn
-  /// levels  of the volume that is drawn
+  /// drawn   blocks of the volume that is drawn; must outlive the wave
+  /// levels  of that volume
   /// rays    must outlive the wave
   /// Throws  Error: not enough memory on the device
   /// Waits   yes
-  FieldWave(ocl::Device &device, const CompressedVolume &field, bool is_own,
+  FieldWave(const CompressedVolume &field, bool is_own, BlockStore &drawn,
             std::span<const VolumeInfo> levels, const FieldPlan &plan, std::uint32_t group_size,
             Wavefront &rays);
 
@@ -35,11 +37,13 @@ class FieldWave : public Wave {
   void set_layer(Layers *layers) { layers_ = layers; }
   void begin() override;
   void enqueue_pass() override;
-  BlockStore *own_blocks() override { return &blocks_; }
+  BlockStore *own_blocks() override { return own_ ? &*own_ : nullptr; }
   LaterPasses *sum_in(FrameStats &stats) const override { return &stats.field; }
 
-  /// Forgets all blocks of the field that are decoded.
-  void clear() { blocks_.clear(); }
+  /// Forgets decoded blocks of its own.
+  void clear() {
+    if (own_) own_->clear();
+  }
   /// As FieldValues::range().
   std::optional<std::array<float, 2>> range(std::size_t num_rays) {
     return values_.range(rays_, num_rays);
@@ -50,7 +54,8 @@ class FieldWave : public Wave {
  private:
   std::optional<std::array<float, 2>> range_;
   bool is_own_;
-  BlockStore blocks_;
+  std::optional<BlockStore> own_;  ///< unless it shares those of the drawn volume
+  BlockStore &blocks_;
   FrameParams grid_;
   FieldMap map_;
   FieldValues values_;

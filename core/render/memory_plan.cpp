@@ -169,11 +169,17 @@ MemoryPlan resized(MemoryPlan plan, std::uint32_t cache_slots) {
   return plan;
 }
 
+FieldPlan plan_shared_field() {
+  FieldPlan plan{.shares_blocks = true};
+  plan.bytes = FieldValues::sizes(plan.num_labels).bytes();
+  return plan;
+}
+
 FieldPlan plan_field(const CompressedVolume &field, const MemoryRequest &request,
                      std::uint64_t budget, std::uint32_t cache_slots) {
   const BlockGrid grid = make_grid(field.info);
   const auto plan_of = [&](std::uint32_t slots, StreamPlace place) {
-    FieldPlan plan;
+    FieldPlan plan{.num_labels = ISO_NUM_LABELS};
     plan.cache = BlockCache::limits_for(grid, slots, request.num_rays, 2, slot_type_for(field));
     plan.stream = place;
     plan.largest_stream_part = request.largest_stream_part;
@@ -189,7 +195,8 @@ FieldPlan plan_field(const CompressedVolume &field, const MemoryRequest &request
                  MacrocellBuffers::sizes(macrocells).bytes() +
                  Macrocells::sizes(macrocells.num_macrocells, 1).bytes() +
                  Macrocells::setup_scratch_bytes(field.num_blocks()) +
-                 BlockCache::sizes(plan.cache).bytes() + FieldValues::sizes(ISO_NUM_LABELS).bytes();
+                 BlockCache::sizes(plan.cache).bytes() +
+                 FieldValues::sizes(plan.num_labels).bytes();
     return plan;
   };
   const bool may_be_on_device =

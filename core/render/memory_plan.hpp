@@ -65,6 +65,8 @@ struct RendererLimits {
 
 /// The memory of a field beside the volume (core/render/field_wave.hpp).
 struct FieldPlan {
+  bool shares_blocks = false;    ///< stream and cache are the drawn volume's
+  std::uint32_t num_labels = 0;  ///< see FieldValues::sizes()
   BlockCache::Limits cache{};
   StreamPlace stream = StreamPlace::kDevice;  ///< kDevice or kHost
   std::uint32_t window_blocks = 0;            ///< kHost: see StreamWindow
@@ -108,8 +110,11 @@ std::uint32_t first_cache_slots(std::uint64_t num_blocks, std::uint64_t num_rays
 /// requested itself; plan.cache_slots if these are enough.
 std::uint32_t grown_cache_slots(const MemoryPlan &plan, std::uint64_t recycled);
 
-/// The plan of a field. It takes at most half the budget, if it can: its cache then has fewer
-/// slots, and kAuto leaves its stream on the host.
+/// The plan of a field that is the volume itself, and shares its blocks.
+FieldPlan plan_shared_field();
+
+/// The plan of a field with blocks of its own. It takes at most half the budget, if it can: its
+/// cache then has fewer slots, and kAuto leaves its stream on the host.
 ///
 /// request      of the volume
 /// cache_slots  0: first_cache_slots()

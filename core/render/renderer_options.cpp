@@ -108,6 +108,10 @@ MemoryPlan plan_of_volume(const ocl::Device &device, const CompressedVolume &vol
 
 }  // namespace
 
+bool shares_blocks(const RendererOptions &options, const CompressedVolume &volume) {
+  return options.field == &volume && !options.with_labels;
+}
+
 MemoryPlan make_plan(const ocl::Device &device, const CompressedVolume &volume,
                      const RendererOptions &options) {
   const MemoryRequest request{options.size.num_rays(),
@@ -128,7 +132,9 @@ MemoryPlan make_plan(const ocl::Device &device, const CompressedVolume &volume,
   std::uint64_t budget = options.memory_budget != 0 ? options.memory_budget
                                                     : device.capabilities().global_memory / 4 * 3;
   if (options.field != nullptr) {
-    FieldPlan field = plan_field(*options.field, request, budget, options.field_slots);
+    const FieldPlan field = shares_blocks(options, volume)
+                                ? plan_shared_field()
+                                : plan_field(*options.field, request, budget, options.field_slots);
     if (field.bytes >= budget)
       throw Error("a memory budget of {} bytes is too small: the field takes {} of them", budget,
                   field.bytes);

@@ -41,9 +41,10 @@ struct RendererOptions {
   bool with_labels = false;        ///< frames have surfaces of labels alone; needs max_surfaces
   /// A second volume for FrameRequest::field_values; null: none. Must outlive the renderer.
   const CompressedVolume *field = nullptr;
-  std::uint32_t field_slots = 0;  ///< of its cache, at least 8; 0: as many as frames need
-  bool with_given_rays = false;   ///< frames may have ambient rays, and rays may be cast
-  bool with_bounce = false;       ///< the same, and ambient rays may bring light
+  /// Slots of the field's own cache, at least 8; 0: as many as frames need.
+  std::uint32_t field_slots = 0;
+  bool with_given_rays = false;  ///< frames may have ambient rays, and rays may be cast
+  bool with_bounce = false;      ///< the same, and ambient rays may bring light
   /// Frames are drawn for pictures: else the kernels of smooth normals and of shade() are built
   /// when they are needed.
   bool with_shading = true;
@@ -62,6 +63,10 @@ inline constexpr std::uint64_t kLayersFactor = 4;
 /// Error if an option is out of range, or if volume or device cannot do what it asks for.
 RendererOptions checked(RendererOptions options, const CompressedVolume &volume,
                         const ocl::Device &device);
+
+/// Whether the field has no blocks of its own: it is the volume that is drawn. Labels have, since
+/// drawn blocks of labels hold the groups that labels are in, and not the labels.
+bool shares_blocks(const RendererOptions &options, const CompressedVolume &volume);
 
 /// The plan of all memory, before any is taken.
 ///

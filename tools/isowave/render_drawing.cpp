@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <system_error>
 #include <utility>
 
 #include "core/accuracy/image_error.hpp"
@@ -71,6 +73,19 @@ bool chooses_levels(const RenderArgs &options, const Drawing &drawing) {
           !MarchPackets::suits(drawing.device->info()));
 }
 
+/// Whether the field is the volume itself, also by its file's name, unless that file is a
+/// segmentation: surfaces of `volume` have their own labels. Options of the volume's grid are not
+/// the field's.
+bool is_field_drawn(const RenderArgs &options, const Drawing &drawing) {
+  const std::string &field = options.color_map.field;
+  if (field == "volume") return true;
+  const VolumeOptions &grid = options.volume;
+  std::error_code failure;
+  return !drawing.appearance.color_by_label && options.series.empty() && grid.dims.empty() &&
+         grid.type.empty() && grid.spacing.empty() &&
+         std::filesystem::equivalent(field, options.input, failure);
+}
+
 bool has_levels_to_choose(const RenderArgs &options, const Drawing &drawing) {
   return chooses_levels(options, drawing) && !drawing.whole.coarser_levels.empty();
 }
@@ -88,7 +103,7 @@ void load_alone(RenderArgs &options, Drawing &drawing) {
     want_levels(options.frame.compression);
   // The field comes first: if it cannot be opened, the volume need not be compressed.
   const std::string &field = options.color_map.field;
-  const bool has_other = options.color_map.by_field && field != "volume";
+  const bool has_other = options.color_map.by_field && !is_field_drawn(options, drawing);
   if (has_other) {
     drawing.other = load_volume(
         field, {}, is_zfp_name(field) ? CompressionOptions{} : options.frame.compression,
@@ -136,7 +151,7 @@ void load_bricks(RenderArgs &options, Drawing &drawing) {
   if (!options.color_map.by_field) return;
   const std::string &field = options.color_map.field;
   options.renderer_flags.values.field = &drawing.bricks->brick;
-  if (field == "volume") return;
+  if (is_field_drawn(options, drawing)) return;
   TeamVolumeSource of_field;
   of_field.path = field;
   together(drawing.team, [&] {

@@ -84,6 +84,7 @@ ordered_json frame_json(double isovalue, std::size_t view, const Camera &camera,
   result["passes"] = stats.passes.size();
   result["normals"] = later_json(stats.normals);
   result["ambient"] = later_json(stats.ambient);
+  if (stats.field.passes != 0) result["field"] = later_json(stats.field);
   result["uploaded_blocks"] = stats.uploaded_blocks;
   result["uploaded_bytes"] = stats.uploaded_bytes;
   ordered_json passes = ordered_json::array();

@@ -37,7 +37,10 @@ struct RendererOptions {
   /// with_bounds and with_time_budget. Other labels than those of the frame before decode
   /// all blocks once. The host draws both without it.
   bool with_labels = false;
-  /// A second volume for Appearance::color_by_field, of any grid. It gets up to half the memory.
+  /// A second volume for Appearance::color_by_field, of any grid. It gets up to half the memory. Or
+  /// the volume itself, the same object: its values are read from the blocks that are drawn, so
+  /// that it takes no more memory, except with with_labels. Frames of fewer bit planes
+  /// (voxel_error, max_surface_error) then decode blocks anew, once for their values, on a device.
   std::shared_ptr<const Volume> field{};
 };
 

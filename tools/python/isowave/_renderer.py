@@ -134,7 +134,8 @@ class Renderer:
         before decode all blocks once. Frames of the host may have either.
     field
         A second volume, of any grid, that ColorMap(by="field") colours surfaces by. It is read at
-        its finest level, and takes up to half the memory.
+        its finest level, and takes up to half the memory. The volume itself takes none, except with
+        labels.
     profiling
         Measures a device's stages, for statistics["stage_ms"]. The host then waits for each pass.
     quick

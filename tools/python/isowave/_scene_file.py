@@ -52,7 +52,8 @@ def open_scene(
     wants_field = field is None and fields["color_by_field"]
     if wants_field and not fields["field"]:
         raise _core.Error(f"{os.fsdecode(path)}: it names no field: give field=")
-    if wants_field and fields["field"] != "volume":
+    is_drawn = fields["field"] == "volume" or (volume is None and _is_volume(fields, options))
+    if wants_field and not is_drawn:
         field = open_field(fields["field"], options)
     title = ""
     if volume is None:
@@ -98,12 +99,26 @@ def open_scene(
     )
 
 
+_OF_ONE_FILE = ("shape", "dtype", "spacing", "dataset", "index")
+
+
+def _is_volume(fields: dict[str, Any], options: dict[str, Any]) -> bool:
+    """Whether the field's file is the scene's volume; not of labels, as `isowave render`."""
+    if fields["color_by_label"] or any(options.get(key) is not None for key in _OF_ONE_FILE):
+        return False
+    try:
+        return os.path.samefile(fields["field"], fields["volume"])
+    except OSError:
+        return False
+
+
 def open_field(name: str, options: dict[str, Any]) -> Volume:
     """Opens a second volume beside one that is opened with these options."""
     if name.endswith(".zfp"):  # compressed already
         return open_volume(name)
-    own = ("shape", "dtype", "spacing", "dataset", "index")  # of the volume's file alone
-    return open_volume(name, **{key: each for key, each in options.items() if key not in own})
+    return open_volume(
+        name, **{key: each for key, each in options.items() if key not in _OF_ONE_FILE}
+    )
 
 
 def optional_vector(value: Any) -> Any:

@@ -101,6 +101,23 @@ def test_titles_are_those_of_the_files(ball: isowave.Volume, tmp_path: pathlib.P
     assert title(one(ball).annotate("caption"), volume=ball) == "", "it may be of another file"
 
 
+def test_a_field_of_the_volumes_file_is_the_volume(
+    ball: isowave.Volume, tmp_path: pathlib.Path
+) -> None:
+    ball.save(tmp_path / "ball.zfp")
+    ball.save(tmp_path / "copy.zfp")
+    file = tmp_path / "scene.json"
+    scene = by_own_caps(ball)
+    for name, is_shared in (("ball.zfp", True), ("copy.zfp", False)):
+        scene.save(file, volume=tmp_path / "ball.zfp")
+        fields = json.loads(file.read_text())
+        assert fields["field"] == "volume"
+        file.write_text(json.dumps({**fields, "field": name}))
+        read = isowave.open_scene(file)
+        assert (read.field is read.volume) == is_shared
+        assert np.array_equal(picture(read), picture(scene))
+
+
 def test_tables_of_colours_are_kept(ball: isowave.Volume, tmp_path: pathlib.Path) -> None:
     table = np.linspace(0, 1, 256)[:, None] * [1, 0.5, 0.25]
     scene = ball.scene().surface(3).look(color_map=isowave.ColorMap(table))
