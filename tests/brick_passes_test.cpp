@@ -43,15 +43,20 @@ class BrickPassesOnDevice : public test::BrickTeam {
 
   Image8 whole() { return picture_of_one(request_, options_); }
 
-  /// Draws, and looks at each pass. goes_on(rank, number of the pass, from 1)
+  /// Draws, and looks at each pass, or only at rounds of light rays.
+  ///
+  /// goes_on  is given the number of passes that were looked at
   static FrameStats draw(TeamRenderer &renderer, FrameRequest request, std::vector<Pass> &passes,
-                         const std::function<bool(std::size_t)> &goes_on) {
+                         const std::function<bool(std::size_t)> &goes_on = {},
+                         bool in_rounds = false) {
     passes.clear();
+    const std::uint64_t before = renderer.composition().reductions;
     request.on_pass = [&](const PassStats &) {
+      if (in_rounds && renderer.composition().reductions == before) return true;
       Pass pass{renderer.shade({})};
       pass.num_hits = renderer.num_hits({});
       passes.push_back(std::move(pass));
-      return goes_on(passes.size());
+      return !goes_on || goes_on(passes.size());
     };
     return renderer.render(request);
   }
@@ -62,7 +67,7 @@ class BrickPassesOnDevice : public test::BrickTeam {
     std::vector<std::size_t> num_calls(num_ranks);
     on_ranks(num_ranks, volume, field, options_, [&](TeamRenderer &renderer, std::uint32_t rank) {
       std::vector<Pass> passes;
-      const FrameStats stats = draw(renderer, request_, passes, [](std::size_t) { return true; });
+      const FrameStats stats = draw(renderer, request_, passes);
       EXPECT_FALSE(stats.cancelled);
       EXPECT_TRUE(stats.complete);
       num_calls[rank] = passes.size();
@@ -139,31 +144,36 @@ TEST_P(BrickPassesOnDevice, ShowsWhatOneRendererShows) {
   });
 }
 
-/// Whatever pass it is. The picture is that of the last pass, or has a layer more.
+/// The picture is that of the last pass, or has a layer more.
 TEST_P(BrickPassesOnDevice, AllStopInTheSamePass) {
   add_slices();
   add_light();
   const Image8 expected = whole();
   on_ranks(3, options_, [&](TeamRenderer &renderer, std::uint32_t rank) {
     std::vector<Pass> passes;
-    draw(renderer, request_, passes, [](std::size_t) { return true; });
-    const std::size_t num_passes = passes.size();
-    ASSERT_GT(num_passes, 20u);
-    // The number of passes varies, but for the last ones, which are rounds of light rays.
-    for (const std::size_t last : {std::size_t{2}, num_passes / 2, num_passes - 4}) {
+    const auto expect_stop = [&](std::size_t last, bool in_rounds) {
       renderer.clear_cache();
-      const FrameStats stats =
-          draw(renderer, request_, passes, [&](std::size_t pass) { return pass < last; });
+      const auto goes_on = [&](std::size_t pass) { return pass < last; };
+      const FrameStats stats = draw(renderer, request_, passes, goes_on, in_rounds);
       EXPECT_TRUE(stats.cancelled);
       EXPECT_FALSE(stats.complete);
       EXPECT_EQ(passes.size(), last);
-      const Image8 picture = renderer.shade({});
+      Image8 picture = renderer.shade({});
       const std::uint64_t num_hits = renderer.num_hits(stats);
       EXPECT_GE(num_hits, passes.back().num_hits);
-      if (rank == 0) {
-        EXPECT_NE(picture.pixels, expected.pixels) << last;
-        EXPECT_EQ(picture.pixels == passes.back().picture.pixels, last != num_passes / 2) << last;
-      }
+      EXPECT_GT(num_hits, 0u);
+      EXPECT_TRUE(rank != 0 || picture.pixels != expected.pixels);
+      return picture;
+    };
+    draw(renderer, request_, passes);
+    ASSERT_GT(passes.size(), 40u);
+    const std::size_t middle = passes.size() / 3;  // their number varies
+    expect_stop(middle, false);
+    const Image8 early = expect_stop(3, false);
+    EXPECT_EQ(early.pixels, passes.back().picture.pixels);
+    for (const std::size_t round : {1u, 3u, 5u}) {
+      const Image8 lit = expect_stop(round, true);
+      EXPECT_EQ(lit.pixels, passes.back().picture.pixels) << round;
     }
     renderer.render(request_);
     const Image8 picture = renderer.shade({});
@@ -180,18 +190,16 @@ TEST_P(BrickPassesOnDevice, OneRankStopsAll) {
     const Image8 expected = picture_of_one(request, options_);
     on_ranks(3, options_, [&](TeamRenderer &renderer, std::uint32_t rank) {
       std::vector<Pass> passes;
-      draw(renderer, request, passes, [](std::size_t) { return true; });
-      const std::size_t num_passes = passes.size();
-      for (const std::size_t last : {std::size_t{2}, num_passes / 2, num_passes - 2}) {
+      for (const bool in_rounds : {false, true}) {
         renderer.clear_cache();
-        EXPECT_TRUE(draw(renderer, request, passes, [&](std::size_t pass) {
-                      return rank != 1 || pass < last;
-                    }).cancelled);
+        const std::size_t last = in_rounds ? 1 : 2;
+        const auto goes_on = [&](std::size_t pass) { return rank != 1 || pass < last; };
+        EXPECT_TRUE(draw(renderer, request, passes, goes_on, in_rounds).cancelled);
         EXPECT_EQ(passes.size(), last);
         const Image8 picture = renderer.shade({});
         EXPECT_TRUE(rank != 0 || picture.pixels != expected.pixels);
       }
-      draw(renderer, request, passes, [](std::size_t) { return true; });
+      EXPECT_FALSE(draw(renderer, request, passes).cancelled);
       EXPECT_TRUE(rank != 0 || passes.back().picture.pixels == expected.pixels);
     });
   }
