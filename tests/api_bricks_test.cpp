@@ -103,10 +103,24 @@ TEST(ApiBricks, SurfacesOfOneRenderer) {
       EXPECT_EQ(frame.normals, expected.normals);
       EXPECT_EQ(frame.statistics.hits, expected.statistics.hits);
     }
+    std::vector<std::uint8_t> last;
     FrameRequest in_passes = request;
-    in_passes.on_pass = [](const Progress &) { return true; };
+    in_passes.on_pass = [&](const Progress &progress) {
+      last = progress.picture();
+      return true;
+    };
+    EXPECT_EQ(renderer.render(in_passes).depth, frame.depth);
+    EXPECT_EQ(last, frame.picture);
+    in_passes.on_pass = [&](const Progress &progress) {
+      return rank == 0 || progress.passes() < 3;
+    };
+    const Frame stopped = renderer.render(in_passes);
+    EXPECT_TRUE(stopped.statistics.cancelled);
+    EXPECT_EQ(stopped.picture.size(), frame.picture.size());
+    in_passes = request;
+    if (rank == 1) in_passes.on_pass = [](const Progress &) { return true; };
     EXPECT_THAT(core::test::error_of([&] { renderer.render(in_passes); }),
-                testing::HasSubstr("leave out on_pass"));
+                testing::HasSubstr("rank 1 has another request"));
   });
   EXPECT_GT(expected.statistics.layers, 4u);
 }

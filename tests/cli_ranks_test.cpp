@@ -237,33 +237,33 @@ TEST_F(CliRanks, WithinAnError) {
 
 /// The picture grows from pass to pass, up to what one process draws.
 TEST_F(CliRanks, PicturesPassByPass) {
-  const std::string render = "render " + kFuel + " -i 40 --size 64x48 --cache-slots 64 -o ";
-  ASSERT_EQ(run_isowave(render + quoted(folder_ / "one.png")).status, 0);
-  const ProgramResult result = run_command(
-      on_ranks(3, render + quoted(folder_ / "x.png") + " --progress-dir " + quoted(folder_ / "p") +
-                      " --stats " + quoted(folder_ / "s.json")));
-  ASSERT_EQ(result.status, 0) << result.err;
-  const std::string one = read_file(folder_ / "one.png");
-  EXPECT_TRUE(one == read_file(folder_ / "x.png"));
-  std::size_t num_passes = 0;
-  const auto stats = nlohmann::json::parse(read_file(folder_ / "s.json"));
-  for (const auto &rank : stats["ranks"]) {
-    const auto &frame = rank["frames"][0];
-    num_passes = std::max(num_passes,
-                          std::size_t(frame["passes"]) + std::size_t(frame["normals"]["passes"]));
-  }
-  std::size_t num_pictures = 0;
-  std::string last;
-  for (; num_pictures < 9999; ++num_pictures) {
-    const auto path = folder_ / "p" / fmt::format("pass{:04}.png", num_pictures + 1);
-    if (!std::filesystem::exists(path)) break;
-    if (num_pictures == 0) {
-      EXPECT_TRUE(one != read_file(path));
+  for (const std::string &scene :
+       {"-i 40", "--surface 20,skin,0.4 --surface 90 --slice z --ambient 1"}) {
+    const std::string render = "render " + kFuel + " " + scene + " --size 64x48 --cache-slots 64 ";
+    ASSERT_EQ(run_isowave(render + "-o " + quoted(folder_ / "one.png")).status, 0);
+    const ProgramResult result = run_command(
+        on_ranks(3, render + "-o " + quoted(folder_ / "x.png") + " --progress-dir " +
+                        quoted(folder_ / "p") + " --stats " + quoted(folder_ / "s.json")));
+    ASSERT_EQ(result.status, 0) << result.err;
+    const std::string one = read_file(folder_ / "one.png");
+    EXPECT_TRUE(one == read_file(folder_ / "x.png"));
+    std::size_t num_passes = 0;
+    const auto stats = nlohmann::json::parse(read_file(folder_ / "s.json"));
+    for (const auto &rank : stats["ranks"]) {
+      const auto &frame = rank["frames"][0];
+      num_passes = std::max(num_passes,
+                            std::size_t(frame["passes"]) + std::size_t(frame["normals"]["passes"]));
     }
-    last = read_file(path);
+    std::vector<std::string> pictures;
+    for (std::string name = "pass0001.png"; std::filesystem::exists(folder_ / "p" / name);
+         name = fmt::format("pass{:04}.png", pictures.size() + 1))
+      pictures.push_back(read_file(folder_ / "p" / name));
+    if (scene == "-i 40") EXPECT_EQ(pictures.size(), num_passes);
+    EXPECT_GE(pictures.size(), num_passes);
+    EXPECT_TRUE(one != pictures.front());
+    EXPECT_TRUE(one == pictures.back());
+    std::filesystem::remove_all(folder_ / "p");
   }
-  EXPECT_EQ(num_pictures, num_passes);
-  EXPECT_TRUE(one == last);
 }
 
 TEST_F(CliRanks, PicturesWithinATime) {
@@ -450,9 +450,6 @@ TEST_F(CliRanks, StatisticsOfEachRank) {
 TEST_F(CliRanks, RefuseWhatTheyCannotDo) {
   const std::string render = "render " + kFuel + " -i 40 --size 16x16 ";
   const std::string within = render + "--max-surface-error ";
-  expect_error(on_ranks(2, "render " + kFuel + " --surface 40,bone,0.5 --size 16x16 " +
-                               "--progress-dir " + quoted(folder_ / "passes")),
-               "--progress-dir: with mpirun, surfaces and slices have no pictures of passes");
   expect_error(on_ranks(2, within + "1"), "convert --levels all, or do without them: --levels 1");
   expect_error(on_ranks(2, within + "0 --levels 1"), "give more than 0");
   expect_error(on_ranks(2, "render " + convert("--rate 8 --no-verify") +

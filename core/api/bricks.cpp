@@ -83,6 +83,15 @@ std::string text_of(const BrickOptions &options, const core::Storage &storage) {
       storage.no_data ? fmt::to_string(*storage.no_data) : "none");
 }
 
+/// How a file is stored if this process's device compresses it.
+core::Storage storage_on(core::ocl::Device &device, const std::string &path,
+                         const Compression &compression) {
+  core::Storage storage = storage_for(path, compression);
+  storage.encoder = core::encoder_on(device);
+  storage.noise = core::noise_on(device.info());
+  return storage;
+}
+
 /// Opens device and volume, at all processes.
 void open(TeamHeld &held, const std::string &path, const Compression &compression,
           const RawFile &raw, const BrickOptions &options) {
@@ -94,13 +103,11 @@ void open(TeamHeld &held, const std::string &path, const Compression &compressio
   core::together(team, [&] {
     if (options.renderer.field)
       throw core::Error("a team's field is a file: give BrickOptions::field");
-    source.storage = storage_for(path, compression);
-    source.storage.measure_error |= options.renderer.with_bounds;
-    source.overrides = to_overrides(raw);
     held.device = std::make_unique<Device::Implementation>(
         core::choose_local_device(options.device, held.team.local_rank()), DeviceOptions{});
-    source.storage.encoder = core::encoder_on(held.device->device);
-    source.storage.noise = core::noise_on(held.device->device.info());
+    source.storage = storage_on(held.device->device, path, compression);
+    source.storage.measure_error |= options.renderer.with_bounds;
+    source.overrides = to_overrides(raw);
   });
   core::agree_on(team, "request", text_of(options, source.storage));
   held.volume = core::open_together(team, source, [&](std::vector<core::VolumeInfo> &levels) {
@@ -114,9 +121,8 @@ void open(TeamHeld &held, const std::string &path, const Compression &compressio
   const std::string field = options.field.string();
   if (field.empty() || field == path) return;
   core::together(team, [&] {
-    source.storage = storage_for(field, core::is_zfp_name(field) ? Compression{} : compression);
-    source.storage.encoder = core::encoder_on(held.device->device);
-    source.storage.noise = core::noise_on(held.device->device.info());
+    source.storage = storage_on(held.device->device, field,
+                                core::is_zfp_name(field) ? Compression{} : compression);
   });
   source.path = field;
   source.overrides = {};

@@ -307,6 +307,7 @@ std::string text_of(const FrameRequest &request) {
       visit(name, field);
     }
   });
+  add(bool(request.on_pass));
   return text;
 }
 

@@ -87,6 +87,11 @@ void in_turns(Team &team, bool is_first, const std::function<void()> &work) {
   }
 }
 
+bool any_of(Team &team, bool own) {
+  const std::vector<std::string> all = team.all_gather(own ? "so" : "");
+  return std::ranges::any_of(all, [](const std::string &each) { return !each.empty(); });
+}
+
 void agree_on(Team &team, const std::string &what, const std::string &text) {
   const std::vector<std::string> texts = team.all_gather(text);
   const auto other =

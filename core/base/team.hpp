@@ -90,6 +90,9 @@ void together(Team &team, const std::function<void()> &work);
 /// kernels that one process has compiled, so the others need not compile them again.
 void in_turns(Team &team, bool is_first, const std::function<void()> &work);
 
+/// Whether any rank says so, at all ranks.
+bool any_of(Team &team, bool own);
+
 /// Throws Error at every rank unless all have the same text; the error names a rank that differs.
 ///
 /// what  names the text

@@ -2,11 +2,17 @@
 // layers, with the values and gradients of their hits. The layers of the whole are put together one
 // after the other: of all bricks' next hits of a ray, the nearest is the layer's, as in
 // layers_choose. Then come its light rays, through all bricks, and rank 0 blends it.
+//
+// Pictures of passes show the layers that bricks have so far. While a layer is lit, those behind it
+// show without light rays.
 
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
+#include <memory>
+#include <string>
+#include <utility>
 
 #include "core/bricks/team_renderer.hpp"
 #include "core/frame/field_values.hpp"
@@ -44,20 +50,21 @@ class HitsOfRays {
       begin += end_[ray];
       end_[ray] = next_[ray];
     }
-    hits_.resize(begin);
+    std::vector<RayHit> hits(begin);
     for (const std::vector<RayHit> &layer : layers) {
-      for (const RayHit &hit : layer) hits_[end_[hit.ray]++] = hit;
+      for (const RayHit &hit : layer) hits[end_[hit.ray]++] = hit;
     }
+    hits_ = std::make_shared<const std::vector<RayHit>>(std::move(hits));
   }
   /// Null: there is none left.
   const RayHit *next(std::size_t ray) const {
-    return next_[ray] < end_[ray] ? &hits_[next_[ray]] : nullptr;
+    return next_[ray] < end_[ray] ? &(*hits_)[next_[ray]] : nullptr;
   }
   void take(std::size_t ray) { ++next_[ray]; }
 
  private:
-  std::vector<std::uint32_t> next_, end_;  ///< [ray]
-  std::vector<RayHit> hits_;
+  std::vector<std::uint32_t> next_, end_;            ///< [ray]
+  std::shared_ptr<const std::vector<RayHit>> hits_;  ///< copies of this have the same
 };
 
 /// Says of a ray's hits which is the nearest: that of the smallest word. The upper half is t. Below
@@ -102,6 +109,20 @@ class HitOrder {
   std::vector<std::uint32_t> numbers_;
 };
 
+/// While there is one, so_far() puts together what pictures show.
+class TeamRenderer::ShowsLayers {
+ public:
+  ShowsLayers(TeamRenderer &of, std::function<const Layered &()> so_far) : of_(of) {
+    of_.layers_so_far_ = std::move(so_far);
+  }
+  ~ShowsLayers() { of_.layers_so_far_ = {}; }
+  ShowsLayers(const ShowsLayers &) = delete;
+  ShowsLayers &operator=(const ShowsLayers &) = delete;
+
+ private:
+  TeamRenderer &of_;
+};
+
 /// Puts the layers of all bricks together. Only rank 0 knows colours; all ranks know where rays
 /// end.
 class TeamRenderer::Layering {
@@ -126,12 +147,14 @@ class TeamRenderer::Layering {
         first_hits_(num_rays_, no_hit()),
         has_hit_(num_rays_) {}
 
+  /// Puts together the layers that are left.
   void operator()(FrameStats &stats) {
-    for (std::uint32_t layer = 0; find_nearest() != 0; ++layer) {
-      if (layer == ISO_MAX_LAYERS) {
+    for (; find_nearest() != 0; ++layer_) {
+      if (layer_ == ISO_MAX_LAYERS) {
         stats.layers.rays_cut = num_rays_ - count_of(HitOrder::kNone);
         break;
       }
+      stats.cancelled |= is_stopped_;
       const std::vector<SentWords> hits = send_hits();
       const OpenCounts open = num_light_rays_ != 0 ? cast_light_rays(hits, stats) : OpenCounts{};
       const std::uint64_t count = blend(hits, open);
@@ -140,10 +163,9 @@ class TeamRenderer::Layering {
     }
   }
 
-  const std::vector<RayColor> &colors() const { return seen_; }  ///< at rank 0
-  std::vector<HitRecord> take_first_hits() { return std::move(first_hits_); }
-  std::uint64_t num_first_hits() const {
-    return static_cast<std::uint64_t>(std::ranges::count(has_hit_, true));
+  Layered take() {
+    const auto num_hits = static_cast<std::uint64_t>(std::ranges::count(has_hit_, true));
+    return {std::move(seen_), std::move(first_hits_), num_hits, frame_};
   }
 
  private:
@@ -217,15 +239,37 @@ class TeamRenderer::Layering {
       } else {
         of_.cast_round(request_, round, placed, open, stats.ambient);
       }
-    }
-    if (light_rays.bounces) {
-      together(of_.team_, [&] {
-        of_.renderer_.set_open(open);
-        of_.renderer_.filter_bounced(request_);
-        open = of_.renderer_.open();
-      });
+      if (light_rays.bounces && round + 1 == num_light_rays_) filter_bounced(open);
+      if (!request_.on_pass || shows_round(hits, open)) continue;
+      is_stopped_ = true;  // the rest is as in pictures of passes
+      stats.cancelled |= round + 1 < num_light_rays_;
+      num_light_rays_ = 0;
     }
     return open;
+  }
+
+  void filter_bounced(OpenCounts &open) {
+    together(of_.team_, [&] {
+      of_.renderer_.set_open(open);
+      of_.renderer_.filter_bounced(request_);
+      open = of_.renderer_.open();
+    });
+  }
+
+  /// Returns whether the frame goes on.
+  bool shows_round(std::span<const SentWords> hits, const OpenCounts &open) {
+    std::optional<Layered> shown;
+    const ShowsLayers shows(of_, [&]() -> const Layered & {
+      if (shown) return *shown;
+      Layering so_far = *this;
+      so_far.num_light_rays_ = 0;
+      so_far.blend(hits, open);
+      ++so_far.layer_;
+      FrameStats unused;
+      so_far(unused);
+      return shown.emplace(so_far.take());
+    });
+    return of_.show_round(request_);
   }
 
   /// Returns the number of hits that are seen.
@@ -270,23 +314,91 @@ class TeamRenderer::Layering {
   LayerParams params_;
   HitOrder order_;
   HitsOfRays own_;
+  std::uint32_t layer_ = 0;
+  bool is_stopped_ = false;  ///< by on_pass
   std::vector<RayColor> seen_;
   std::vector<std::uint64_t> words_, own_words_;  ///< [ray] of the layer
   std::vector<HitRecord> first_hits_;             ///< [ray] this brick's
   std::vector<bool> has_hit_;                     ///< [ray] one that is seen
 };
 
+/// The layers of bricks that are being drawn.
+class TeamRenderer::LayersOfBricks {
+ public:
+  LayersOfBricks(TeamRenderer &of, const FrameRequest &request) : of_(of), request_(request) {}
+
+  FrameStats draw() {
+    const ShowsLayers shows(of_, [this]() -> const Layered & { return so_far(); });
+    FrameRequest in_passes = request_;
+    if (request_.on_pass) {
+      in_passes.on_pass = [this](const PassStats &pass) {
+        ++num_passes_;
+        return request_.on_pass(pass);
+      };
+    }
+    return of_.draw_brick(in_passes, [this](const FrameRequest &request) {
+      return of_.renderer_.render_layers(request, layers_);
+    });
+  }
+  std::span<const std::vector<RayHit>> layers() const { return layers_; }
+
+ private:
+  /// Put together anew if any brick shows more than in the pass before: passes behind the first
+  /// layer show nothing until the next one is whole.
+  const Layered &so_far() {
+    const bool is_first = layers_.empty();
+    const std::vector<std::string> shown = of_.team_.all_gather(
+        is_first ? "pass " + std::to_string(num_passes_) : std::to_string(layers_.size()));
+    if (shown == shown_) return so_far_;
+    std::vector<std::vector<RayHit>> first;
+    together(of_.team_, [&] {
+      if (is_first) first.push_back(of_.renderer_.first_layer_so_far(request_));
+    });
+    Layering layering(of_, request_, is_first ? first : layers_);
+    FrameStats unused;
+    layering(unused);
+    so_far_ = layering.take();
+    shown_ = shown;
+    return so_far_;
+  }
+
+  TeamRenderer &of_;
+  const FrameRequest &request_;
+  std::vector<std::vector<RayHit>> layers_;
+  std::uint64_t num_passes_ = 0;
+  std::vector<std::string> shown_;  ///< [rank] what each brick has shown in so_far_
+  Layered so_far_;
+};
+
+/// On rank 0; empty on others.
+HostArray<std::uint8_t> TeamRenderer::picture_so_far(const Appearance &appearance) {
+  const Layered &shown = layers_so_far_();
+  num_hits_ = shown.num_hits;
+  if (team_.rank() != 0) return {};
+  const Image8 image =
+      shade_layers_scalar(shown.frame, make_shade_params(whole_levels_.front(), appearance),
+                          shown.colors, renderer_.size().samples);
+  HostArray<std::uint8_t> picture = memory_.array<std::uint8_t>(image.pixels.size());
+  std::ranges::copy(image.pixels, picture.data());
+  return picture;
+}
+
 /// request: with light rays, which go on in other bricks.
 void TeamRenderer::draw_layers(const FrameRequest &request, FrameStats &stats) {
-  std::vector<std::vector<RayHit>> layers;
-  together(team_, [&] { stats = renderer_.render_layers(without_light_rays(request), layers); });
+  const FrameRequest of_bricks = without_light_rays(request);
+  LayersOfBricks bricks(*this, of_bricks);
+  stats = bricks.draw();
   stats.layers = {};
-  Layering layering(*this, request, layers);
+  Layering layering(*this, stats.cancelled ? of_bricks : request, bricks.layers());
   layering(stats);
-  if (team_.rank() == 0) renderer_.set_colors(layering.colors());
-  own_hits_ = layering.take_first_hits();
-  num_hits_ = layering.num_first_hits();
+  Layered layered = layering.take();
+  if (team_.rank() == 0) renderer_.set_colors(layered.colors);
+  own_hits_ = std::move(layered.first_hits);
+  num_hits_ = layered.num_hits;
   has_whole_ = true;
+  // Light rays have shown the whole in their last round.
+  if (request.on_pass && !stats.cancelled && light_rays_of(request).count() == 0)
+    show_round(request);
 }
 
 }  // namespace isowave::core

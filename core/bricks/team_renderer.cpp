@@ -74,26 +74,32 @@ FrameStats TeamRenderer::render(const FrameRequest &request) {
   forget_hits();
   num_hits_.reset();
   has_whole_ = false;
-  const FrameRequest own = without_light_rays(request);
   FrameStats stats;
   if (!request.surfaces.empty()) {
     draw_layers(request, stats);
   } else {
-    if (request.on_pass) {
-      stats = render_in_step(own);
-    } else {
-      together(team_, [&] { stats = renderer_.render(own); });
-    }
+    stats = draw_brick(without_light_rays(request),
+                       [&](const FrameRequest &own) { return renderer_.render(own); });
     if (light_rays_of(request).count() != 0 && !stats.cancelled) add_ambient(request, stats);
   }
   stats.complete = !stats.cancelled;
   return stats;
 }
 
-/// A rank that is through goes on to take part in pictures, until all are.
-FrameStats TeamRenderer::render_in_step(const FrameRequest &request) {
-  enum State : char { kAtWork, kThrough, kFailed };
-  bool all_through = false, one_failed = false, is_stopped = false;
+/// Draws this rank's brick by draw(), with all ranks in step if pictures of passes may be asked
+/// for.
+FrameStats TeamRenderer::draw_brick(const FrameRequest &request, const DrawBrick &draw) {
+  if (request.on_pass) return draw_in_step(request, draw);
+  FrameStats stats;
+  together(team_, [&] { stats = draw(request); });
+  return stats;
+}
+
+/// A rank that is through goes on to take part in pictures, until all are. A rank that ends tells
+/// the others, which end in their next pass.
+FrameStats TeamRenderer::draw_in_step(const FrameRequest &request, const DrawBrick &draw) {
+  enum State : char { kAtWork, kThrough, kStops, kFails };
+  bool all_through = false, one_ends = false, stops = false;
   PassStats last;
   const auto tell = [&](State state) {
     const std::vector<std::string> states = team_.all_gather(std::string(1, state));
@@ -101,14 +107,14 @@ FrameStats TeamRenderer::render_in_step(const FrameRequest &request) {
       return [wanted](const std::string &each) { return each.front() == wanted; };
     };
     all_through = std::ranges::all_of(states, is(kThrough));
-    one_failed = std::ranges::any_of(states, is(kFailed));
+    one_ends = std::ranges::any_of(states, is(kStops)) || std::ranges::any_of(states, is(kFails));
   };
   const auto take_part = [&](State state) {
     tell(state);
-    if (all_through || one_failed) return false;
+    if (all_through || one_ends) return false;
     forget_hits();
-    is_stopped = !request.on_pass(last);
-    return !is_stopped;
+    stops = !request.on_pass(last);
+    return !stops;
   };
   FrameStats stats;
   FrameRequest own = request;
@@ -117,20 +123,29 @@ FrameStats TeamRenderer::render_in_step(const FrameRequest &request) {
     return take_part(kAtWork);
   };
   try {
-    stats = renderer_.render(own);
-    while (!is_stopped && !one_failed && take_part(kThrough)) {
+    stats = draw(own);
+    while (!stops && !one_ends && take_part(kThrough)) {
     }
+    if (stops) tell(kStops);
   } catch (...) {
-    if (!is_stopped && !one_failed) tell(kFailed);
+    if (!one_ends) tell(kFails);
     const auto failure = std::current_exception();
     together(team_, [&] { std::rethrow_exception(failure); });
   }
   together(team_, [] {});
-  const std::vector<std::string> cancelled =
-      team_.all_gather(stats.cancelled ? "cancelled" : std::string());
-  stats.cancelled =
-      std::ranges::any_of(cancelled, [](const std::string &each) { return !each.empty(); });
+  stats.cancelled = any_of(team_, stats.cancelled);
   return stats;
+}
+
+/// Calls on_pass after a round of all bricks. Returns whether the frame goes on.
+bool TeamRenderer::show_round(const FrameRequest &request) {
+  bool goes_on = true;
+  together(team_, [&] {
+    PassStats pass;
+    pass.completed_percent = 100;
+    goes_on = request.on_pass(pass);
+  });
+  return !any_of(team_, !goes_on);
 }
 
 Camera TeamRenderer::camera(std::span<const float> isovalues, std::optional<ImageSize> size,
@@ -366,12 +381,8 @@ void TeamRenderer::add_ambient(const FrameRequest &request, FrameStats &stats) {
     }
     const bool is_last = round + 1 == light_rays.count();
     if (!is_last && !request.on_pass) continue;
-    together(team_, [&] {
-      renderer_.set_open(open);
-      PassStats pass;
-      pass.completed_percent = 100;
-      stats.cancelled = request.on_pass && !request.on_pass(pass) && !is_last;
-    });
+    together(team_, [&] { renderer_.set_open(open); });
+    if (request.on_pass) stats.cancelled = !show_round(request) && !is_last;
   }
   if (light_rays.bounces && !stats.cancelled)
     together(team_, [&] { renderer_.filter_bounced(request); });
@@ -412,6 +423,7 @@ void TeamRenderer::forget_hits() {
 }
 
 std::span<const HitRecord> TeamRenderer::own_hits() {
+  if (layers_so_far_) return layers_so_far_().first_hits;
   if (own_hits_.empty()) own_hits_ = renderer_.hits();
   return own_hits_;
 }
@@ -502,6 +514,7 @@ FrameArrays TeamRenderer::fetch(const WantedArrays &wanted, const Appearance &ap
 HostArray<std::uint8_t> TeamRenderer::compose_picture(const Appearance &appearance) {
   const bool receives = team_.rank() == 0;
   constexpr WantedArrays kPicture{.picture = true};
+  if (layers_so_far_) return picture_so_far(appearance);
   if (has_whole_)
     return receives ? renderer_.fetch(kPicture, appearance).picture : HostArray<std::uint8_t>{};
   const bool has_values = appearance.color_by_field.has_value();

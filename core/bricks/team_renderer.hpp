@@ -49,7 +49,9 @@ class TeamRenderer : public Renderer {
   /// surfaces and of slices are blended on rank 0.
   ///
   /// request  All ranks have an on_pass, or none. It is called at all ranks after each pass of any
-  ///          rank, may ask for the picture so far, and must return the same at all ranks.
+  ///          rank, and after each round of light rays of all; in frames of layers without light
+  ///          rays, once more with the whole picture. All ranks may ask for the picture so far, or
+  ///          none. The frame stops if it returns false at any rank.
   /// Returns  what the frame took; cancelled if any rank is unfinished
   /// Throws   Error at every rank, if one rank fails as DeviceRenderer::render() does, or its
   ///          on_pass throws; or if the whole would be drawn with coarser levels of detail than the
@@ -88,10 +90,24 @@ class TeamRenderer : public Renderer {
   const CompositionStats &composition() const { return composition_; }
 
  private:
-  void check_levels(const FrameRequest &request) const;
-  FrameStats render_in_step(const FrameRequest &request);
-  void draw_layers(const FrameRequest &request, FrameStats &stats);
+  using DrawBrick = std::function<FrameStats(const FrameRequest &request)>;
+  /// Layers of all bricks.
+  struct Layered {
+    std::vector<RayColor> colors;       ///< [ray] at rank 0
+    std::vector<HitRecord> first_hits;  ///< [ray] this brick's
+    std::uint64_t num_hits = 0;         ///< rays with a hit
+    FrameParams frame{};
+  };
   class Layering;
+  class LayersOfBricks;
+  class ShowsLayers;
+
+  void check_levels(const FrameRequest &request) const;
+  FrameStats draw_brick(const FrameRequest &request, const DrawBrick &draw);
+  FrameStats draw_in_step(const FrameRequest &request, const DrawBrick &draw);
+  bool show_round(const FrameRequest &request);
+  void draw_layers(const FrameRequest &request, FrameStats &stats);
+  HostArray<std::uint8_t> picture_so_far(const Appearance &appearance);
   void cast_round(const FrameRequest &request, std::uint32_t round,
                   std::span<const HitRecord> placed, OpenCounts &open, LaterPasses &stats);
   LevelRange drawn_levels(const FrameRequest &request) const;
@@ -134,6 +150,8 @@ class TeamRenderer : public Renderer {
   std::optional<std::vector<float>> values_;  ///< of compose_values(); none: not composed yet
   bool has_whole_ = false;                    ///< the renderer has the hits of all bricks already
   std::optional<std::uint64_t> num_hits_;     ///< hits in what was put together last
+  /// Puts the layers so far together, at all ranks. Within on_pass of a frame of layers alone.
+  std::function<const Layered &()> layers_so_far_;
   CompositionStats composition_;
   HostMemory memory_;
 };

@@ -133,8 +133,6 @@ void check(const FrameRequest &request, const Abilities &abilities) {
       request.field_values && request.field_labels, abilities.field_labels,
       "the field's voxels are no labels, exact whole numbers from 0 to 65535: leave out colours by "
       "label");
-  need(!request.surfaces.empty() && request.on_pass && !abilities.cells, false,
-       "a team draws several or translucent surfaces at once: leave out on_pass");
   need(!request.slices.planes.empty(), abilities.most_surfaces != 0,
        "this renderer draws no slices: leave them out, or draw on the host, or on a device by a "
        "renderer that was made with_surfaces");

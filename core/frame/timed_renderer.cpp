@@ -116,6 +116,7 @@ TimedRenderer::Drawn TimedRenderer::draw_step(const FrameRequest &request, std::
     return !drawn.is_stopped && (is_first || now + pass_ms <= end_ms);
   };
   drawn.stats = inner().render(in_time);
+  drawn.is_stopped = any_of(team(), drawn.is_stopped);
   return drawn;
 }
 

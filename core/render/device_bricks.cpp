@@ -5,6 +5,7 @@
 
 #include "core/base/error.hpp"
 #include "core/render/device_renderer.hpp"
+#include "core/render/picture_so_far.hpp"
 #include "kernels_cl/portable/clip.h"
 
 namespace isowave::core {
@@ -33,6 +34,12 @@ std::vector<HitRecord> DeviceRenderer::placed(std::vector<HitRecord> hits,
 
 HitRecord DeviceRenderer::placed(const HitRecord &hit) const {
   return placed_hit(&blocks_.level_frames->front(), 0, hit);
+}
+
+std::vector<RayHit> DeviceRenderer::first_layer_so_far(const FrameRequest &request) {
+  check_has_picture();
+  const PictureSoFar shown(*this);
+  return layers_->read(rays_, true, request.field_values || !request.slices.planes.empty());
 }
 
 void DeviceRenderer::begin_ambient(const FrameRequest &request, std::vector<HitRecord> placed,

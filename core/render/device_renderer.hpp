@@ -102,10 +102,16 @@ class DeviceRenderer : public Renderer {
   // For bricks, whose pictures are put together (core/bricks). A brick's own frames have no ambient
   // rays, since these go on in other bricks.
 
-  /// render() of a frame of layers, without on_pass.
+  /// render() of a frame of layers.
   ///
-  /// layers  gets each layer's hits, and those behind the last layer that is drawn
+  /// layers  gets each layer's hits when the layer is whole, and those behind the last layer that
+  ///         is drawn
   FrameStats render_layers(const FrameRequest &request, std::vector<std::vector<RayHit>> &layers);
+  /// The hits so far of the first layer, within on_pass and before it is whole. Those on slices may
+  /// have no values, and be unseen. Waits.
+  ///
+  /// request  that of the frame
+  std::vector<RayHit> first_layer_so_far(const FrameRequest &request);
   /// Sets the colours of a frame of layers, [height * width], that pictures have instead of its
   /// own. Waits.
   void set_colors(std::span<const RayColor> colors);

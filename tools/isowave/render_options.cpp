@@ -242,9 +242,6 @@ void check_options(const CLI::App &command, const RenderArgs &options, const Tea
     refuse_options(command, {"--color"}, "--color-by colours surfaces: leave out either");
   if (options.color_map.by_field)
     refuse_options(command, {"--time-budget"}, "colours by a field are drawn without a time");
-  if (team.size() > 1 && draws_layers(options))
-    refuse_options(command, {"--progress-dir"},
-                   "with mpirun, surfaces and slices have no pictures of passes: leave it out");
   if (options.transparent)
     refuse_options(command, {"--background"}, "pictures with --transparent have none");
   if (options.stats.empty())

@@ -32,8 +32,9 @@ nb::tuple camera_tuple(const isowave::Camera &camera) {
                         camera.fovy_degrees);
 }
 
-/// [height][width][3], or [4] if it is transparent.
+/// [height][width][3], or [4] if it is transparent; [0][0][3] at ranks that get no picture.
 nb::object picture_array(isowave::Array<std::uint8_t> &&pixels, const isowave::ImageSize &size) {
+  if (pixels.empty()) return to_numpy<std::uint8_t>(std::move(pixels), {0, 0, 3});
   const std::size_t opaque = std::size_t{3} * size.width * size.height;
   const std::size_t channels = pixels.size() > opaque ? 4 : 3;
   return to_numpy<std::uint8_t>(std::move(pixels), {size.height, size.width, channels});

@@ -173,12 +173,11 @@ struct FrameRequest {
   /// back: what lies behind translucent surfaces is seen through them. At most 16 crossings of a
   /// ray are drawn (FrameStatistics::rays_cut). Empty: the surface of `isovalue` alone, opaque, in
   /// appearance.surface. A device needs RendererOptions::with_surfaces. Not with bound,
-  /// voxel_pixels, max_surface_error, max_image_error, time_budget_ms and want_bounds;
-  /// in a team, nor with ambient_rays, shadow_rays and on_pass.
+  /// voxel_pixels, max_surface_error, max_image_error, time_budget_ms and want_bounds.
   std::vector<Surface> surfaces{};
   /// Slices beside `surfaces`, or beside that of `isovalue`: up to 8 with the surfaces, blended
   /// with them, with their conditions. A slice counts as a crossing, is in front of a surface at
-  /// the same place, and has the plane's normal. Not in a team.
+  /// the same place, and has the plane's normal.
   std::vector<Slice> slices{};
 
   /// Largest distance between voxels of a coarser level of detail [pixels]; 0: the finest level
@@ -222,8 +221,8 @@ struct FrameRequest {
 
   /// Called after each pass, also those for smooth normals, a field, ambient and shadow rays; on
   /// the host after each band of rows, from the top. If it returns false, the frame stops with the
-  /// picture so far. In a team, all processes have an on_pass or none; they return the same, and
-  /// get the same pictures.
+  /// picture so far. In a team, all processes have an on_pass or none, and all of them ask for the
+  /// picture of a pass, or none does. If it returns false in any process, the frame stops in all.
   std::function<bool(const Progress &)> on_pass{};
 };
 

@@ -17,8 +17,8 @@ from isowave._checked import Isovalue, number, size_of
 from isowave._compress import compression_options
 from isowave._image import Image
 from isowave._placed import Placed
-from isowave._renderer import draw, renderer_options, warn_of_isovalue
-from isowave._request import Request, isovalue_or_surfaces
+from isowave._renderer import draw, goes_on, renderer_options, warn_of_isovalue
+from isowave._request import OnPass, Progress, Request, isovalue_or_surfaces
 from isowave._surface import Surface
 
 OUTPUTS = ("rgb", "depth", "normals")
@@ -204,6 +204,16 @@ class BrickRenderer(Placed[_core.Renderer]):
             raise _core.Error("labels needs a renderer that was made with labels=True")
         return request
 
+    def _for_all(self, on_pass: OnPass) -> OnPass:
+        """Calls rank 0's on_pass, when all processes have put the picture together."""
+        processes = self._processes
+
+        def call(progress: Progress) -> bool:
+            progress._keep_picture()
+            return processes.together(lambda: processes.rank != 0 or goes_on(on_pass, progress))
+
+        return call
+
     def render(
         self,
         isovalue: float | None = None,
@@ -214,10 +224,11 @@ class BrickRenderer(Placed[_core.Renderer]):
         outputs: Sequence[str] = OUTPUTS,
         **more: Any,
     ) -> Image | None:
-        """Draws a frame; arguments as Renderer.render(), without positions, time_budget, on_pass.
+        """Draws a frame; arguments as Renderer.render(), without positions and time_budget.
 
         `max_error` by proof and the output "bounds" need bounds=True. One Renderer would choose the
-        same detail, and find the same bounds.
+        same detail, and find the same bounds. All processes give an `on_pass`, or none. That of
+        rank 0 is called, with the picture of the whole volume, and may stop the frame.
 
         Returns
         -------
@@ -244,9 +255,8 @@ class BrickRenderer(Placed[_core.Renderer]):
             for name in request.outputs:
                 if name not in ALL_OUTPUTS:
                     raise ValueError(f"outputs {name}: bricks have {', '.join(ALL_OUTPUTS)}")
-            for name in ("time_budget", "on_pass"):
-                if getattr(request, name) is not None:
-                    raise TypeError(f"a BrickRenderer draws without {name}")
+            if request.time_budget is not None:
+                raise TypeError("a BrickRenderer draws without time_budget")
             return self._checked(request)
 
         request = self._processes.together(ask)
@@ -256,6 +266,8 @@ class BrickRenderer(Placed[_core.Renderer]):
             wanted = None if request.surfaces else request.isovalue
             view = self.camera(wanted, request.size, surfaces=request.surfaces)
             request = replace(request, camera=view)
+        if request.on_pass is not None:
+            request = replace(request, on_pass=self._for_all(request.on_pass))
         frame = draw(self._core, request, interrupts=False)
         if self._processes.rank != 0:
             return None

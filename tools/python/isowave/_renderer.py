@@ -21,7 +21,14 @@ from isowave._clip import ClipPlane
 from isowave._color_map import ColorMap
 from isowave._image import Image
 from isowave._levels import Voxels
-from isowave._request import ALL_OUTPUTS, Progress, Request, isovalue_or_surfaces, normals_of
+from isowave._request import (
+    ALL_OUTPUTS,
+    OnPass,
+    Progress,
+    Request,
+    isovalue_or_surfaces,
+    normals_of,
+)
 from isowave._slice import Slice
 from isowave._surface import MAX_SURFACES, Color, Surface
 
@@ -78,14 +85,18 @@ def warn_of_isovalue(core: _core.Volume | _core.Renderer, isovalue: float) -> No
     warnings.warn(notice, RuntimeWarning, stacklevel=level)
 
 
+def goes_on(on_pass: OnPass, progress: Progress) -> bool:
+    answer = on_pass(progress)
+    return answer is None or flag("what on_pass returns", answer)
+
+
 def draw(renderer: _core.Renderer, request: Request, interrupts: bool = True) -> dict[str, Any]:
     """Draws a frame, and returns its arrays. interrupts: looks for Ctrl-C after each pass."""
     on_pass = request.on_pass
 
     def callback(view: _core.PassView) -> bool:
         assert on_pass is not None
-        answer = on_pass(Progress(view))
-        return answer is None or flag("what on_pass returns", answer)
+        return goes_on(on_pass, Progress(view))
 
     is_main = threading.current_thread() is threading.main_thread()
     watched = None if on_pass is None else callback

@@ -45,6 +45,14 @@ class Progress:
 
     def __init__(self, view: _core.PassView) -> None:
         self._view = view
+        self._picture: npt.NDArray[np.uint8] | None = None
+
+    def _keep_picture(self) -> None:
+        """Draws the picture now. All processes of a BrickRenderer call this."""
+        self._picture = self._view.picture()
+
+    def _draw(self) -> npt.NDArray[np.uint8]:
+        return self._view.picture() if self._picture is None else self._picture
 
     @property
     def passes(self) -> int:
@@ -58,15 +66,18 @@ class Progress:
     @property
     def rgb(self) -> npt.NDArray[np.uint8]:
         """(height, width, 3), drawn when it is asked for; smaller at first with a time budget."""
-        return rgb_of(self._view.picture())
+        return rgb_of(self._draw())
 
     @property
     def rgba(self) -> npt.NDArray[np.uint8]:
         """(height, width, 4), as rgb, if the picture is transparent."""
-        picture = self._view.picture()
+        picture = self._draw()
         if picture.shape[2] == 3:
             raise ValueError("the picture has no alpha: render(..., transparent=True)")
         return picture
+
+
+OnPass = Callable[[Progress], bool | None]
 
 
 @dataclass(frozen=True)
@@ -111,7 +122,7 @@ class Request:
     voxel_error: float = 0.0
     time_budget: float | None = None
     ambient: int = 0
-    on_pass: Callable[[Progress], bool | None] | None = None
+    on_pass: OnPass | None = None
 
     def __post_init__(self) -> None:
         outputs = names("outputs", self.outputs)

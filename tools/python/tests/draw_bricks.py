@@ -67,6 +67,32 @@ labelled = isowave.BrickRenderer(
 )
 keep("labels", labelled.render(surfaces=groups, color_map=isowave.ColorMap(by="labels")))
 
+
+def passes_of(renderer, last=None, **scene):
+    """Rank 0's pictures of the passes, up to number `last`, and the frame."""
+    seen = []
+
+    def on_pass(progress):
+        assert rank == 0 and progress.passes == len(seen) + 1
+        seen.append(progress.rgb)
+        return len(seen) != last
+
+    return seen, renderer.render(size=(48, 32), samples=1, on_pass=on_pass, **scene)
+
+
+for name, by, scene in (
+    ("one", renderer, {"isovalue": 40}),
+    ("layers", layered, {"surfaces": both, "slices": slices, "ambient": 1}),
+):
+    seen, image = passes_of(by, **scene)
+    keep(f"passes of {name}", image)
+    stopped, part = passes_of(by, last=1, **scene)
+    if image is not None:
+        np.testing.assert_array_equal(seen[-1], image.rgb)
+        assert (seen[0] != image.rgb).any() and image.statistics["complete"]
+        assert len(stopped) == 1 and not part.statistics["complete"]
+        assert part.rgb.shape == image.rgb.shape
+
 errors = {}
 
 
@@ -96,6 +122,9 @@ fails("camera", lambda: renderer.render(40, camera=camera if rank == 1 else None
 fails("color", lambda: renderer.render(40, color="bluish" if rank == 1 else None))
 fails("transparent", lambda: renderer.render(40, transparent=rank == 1))
 fails("outputs", lambda: renderer.render(40, outputs=("position",)))
+fails("in on_pass", lambda: renderer.render(40, on_pass=lambda progress: progress.rgba))
+fails("answer", lambda: renderer.render(40, on_pass=lambda progress: "yes"))
+fails("one on_pass", lambda: renderer.render(40, on_pass=print if rank == 1 else None))
 fails("time", lambda: renderer.render(40, time_budget=1.0))
 fails("max_error", lambda: renderer.render(40, max_error=1.0))
 fails("no error", lambda: bounded.render(40, max_error=0.0))

@@ -102,6 +102,25 @@ def test_surfaces(drawn):
     assert np.isfinite(image.field).any()
 
 
+def test_pictures_of_passes(drawn):
+    pictures, _ = drawn
+    fuel = isowave.open(FUEL, exact=True)
+    renderer = fuel.renderer(size=(64, 48), surfaces=2, rays=True)
+    for name, scene in (
+        ("one", {"isovalue": 40}),
+        (
+            "layers",
+            {
+                "surfaces": [isowave.Surface(20, "skin", 0.4), isowave.Surface(90, "blue")],
+                "slices": [isowave.Slice("z", 14), isowave.Slice("x", 30, 0.5)],
+                "ambient": 1,
+            },
+        ),
+    ):
+        image = renderer.render(size=(48, 32), outputs=("rgb", "depth", "normals"), **scene)
+        expect(pictures, f"passes of {name}", image)
+
+
 def test_bounced_light(drawn):
     pictures, _ = drawn
     renderer = isowave.open(FUEL, exact=True).renderer(size=(64, 48), bounce=True)
@@ -160,6 +179,9 @@ def test_bounds_of_the_error(drawn, levelled):
         ("color", "there is no colour 'bluish': give #RRGGBB"),
         ("transparent", "rank 1 has another request than rank 0"),
         ("outputs", "outputs position: bricks have rgb, depth, normals, bounds"),
+        ("in on_pass", "the picture has no alpha"),
+        ("answer", "what on_pass returns"),
+        ("one on_pass", "rank 1 has another request than rank 0"),
         ("time", "a BrickRenderer draws without time_budget"),
         ("max_error", "made with_bounds"),
         ("no error", "an error of 0 pixels cannot be kept"),
