@@ -165,7 +165,7 @@ void skip_unless_long() {
 }
 
 TEST_F(CliRanks, DrawWhatOneProcessDraws) {
-  expect_same(convert(""), "-i 40 --size 96x64", 2);  // the view that the surface fills
+  expect_same(convert(""), "-i 40 --size 96x64 --fit surface", 2);
   expect_same(kFuel, "-i 40 --size 64x48 --transparent", 2, " --bricks active");
   expect_same(kFuel, "--tolerance 0.3 --orbit 2 -i 40 -i 90 --size 64x48 --pipeline blocks", 3);
 }
