@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 if TYPE_CHECKING:
-    from isowave import _core
+    from isowave._core import Voxels
 
 
 class _Grid(Protocol):
@@ -67,11 +67,11 @@ class Placed(Generic[Core]):
         return np.ascontiguousarray(columns.T)
 
     @property
-    def _grid(self) -> _core.Voxels:
+    def _grid(self) -> Voxels:
         """For the compiled part; the type of voxels has no effect on views."""
         core = self._core
         x, y, z = core.dims
-        columns = [*core.direction]
+        columns: Any = core.direction
         return "uint8", (x, y, z), core.spacing, core.origin, columns, core.is_anatomical
 
     @property
