@@ -79,8 +79,8 @@ std::vector<HitRecord> TwinRenderer::cast_rays(std::span<const WorldRay>, float,
 }
 
 Camera TwinRenderer::camera(std::span<const float> isovalues, std::optional<ImageSize> size,
-                            std::uint32_t num_views) {
-  return HostRenderer(volume_).camera(isovalues, size.value_or(largest_), num_views);
+                            const Viewpoint &from) {
+  return HostRenderer(volume_).camera(isovalues, size.value_or(largest_), from);
 }
 
 FrameArrays TwinRenderer::fetch(const WantedArrays &wanted, const Appearance &appearance) {

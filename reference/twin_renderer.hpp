@@ -31,7 +31,7 @@ class TwinRenderer : public Renderer {
   std::vector<HitRecord> cast_rays(std::span<const WorldRay> rays, float isovalue,
                                    Normals normals) override;
   Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {},
-                std::uint32_t num_views = 1) override;
+                const Viewpoint &from = {}) override;
 
   ImageSize size() const override { return size_; }
   FrameArrays fetch(const WantedArrays &wanted, const Appearance &appearance) override;

@@ -204,7 +204,8 @@ TEST(Turntable, KeepsALongBoxInAllPictures) {
   double closest = 0;
   for (const std::uint32_t n : {1u, 4u, 7u}) {
     closest = 0;
-    for (const Camera &camera : turntable(camera_of_box(info, begin, end, kAspect, n), n)) {
+    for (const Camera &camera :
+         turntable(camera_of_box(info, begin, end, kAspect, {.num_views = n}), n)) {
       for (int corner = 0; corner < 8; ++corner) {
         const glm::dvec3 index(corner & 1 ? begin.x : end.x, corner & 2 ? begin.y : end.y,
                                corner & 4 ? begin.z : end.z);
@@ -215,6 +216,17 @@ TEST(Turntable, KeepsALongBoxInAllPictures) {
     }
     EXPECT_NEAR(closest, 0.95, 1e-9) << n << " views from no further than that needs";
   }
+}
+
+TEST(OrbitCameras, ArePulledBackForPicturesThatAreNarrowerThanHigh) {
+  VolumeInfo info;
+  info.dims = {11, 21, 31};
+  const auto distance = [&](double aspect) {
+    const Camera camera = orbit_cameras(info, 1, {}, aspect).at(0);
+    return glm::distance(camera.eye, camera.at);
+  };
+  EXPECT_EQ(distance(2), distance(1));
+  EXPECT_NEAR(distance(0.5), 2 * distance(1), 1e-12 * distance(1));
 }
 
 TEST(OrbitCameras, FollowADirectionMatrix) {

@@ -165,7 +165,7 @@ void skip_unless_long() {
 }
 
 TEST_F(CliRanks, DrawWhatOneProcessDraws) {
-  expect_same(convert(""), "-i 40 --size 96x64", 2);  // the view that the surface fills
+  expect_same(convert(""), "-i 40 --size 96x64 --fit surface", 2);
   expect_same(kFuel, "-i 40 --size 64x48 --transparent", 2, " --bricks active");
   expect_same(kFuel, "--tolerance 0.3 --orbit 2 -i 40 -i 90 --size 64x48 --pipeline blocks", 3);
 }
@@ -237,7 +237,7 @@ TEST_F(CliRanks, WithinAnError) {
 
 /// The picture grows from pass to pass, up to what one process draws.
 TEST_F(CliRanks, PicturesPassByPass) {
-  for (const std::string &scene :
+  for (const std::string scene :
        {"-i 40", "--surface 20,skin,0.4 --surface 90 --slice z --ambient 1"}) {
     const std::string render = "render " + kFuel + " " + scene + " --size 64x48 --cache-slots 64 ";
     ASSERT_EQ(run_isowave(render + "-o " + quoted(folder_ / "one.png")).status, 0);
@@ -258,7 +258,9 @@ TEST_F(CliRanks, PicturesPassByPass) {
     for (std::string name = "pass0001.png"; std::filesystem::exists(folder_ / "p" / name);
          name = fmt::format("pass{:04}.png", pictures.size() + 1))
       pictures.push_back(read_file(folder_ / "p" / name));
-    if (scene == "-i 40") EXPECT_EQ(pictures.size(), num_passes);
+    if (scene == "-i 40") {
+      EXPECT_EQ(pictures.size(), num_passes);
+    }
     EXPECT_GE(pictures.size(), num_passes);
     EXPECT_TRUE(one != pictures.front());
     EXPECT_TRUE(one == pictures.back());

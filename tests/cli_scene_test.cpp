@@ -85,7 +85,7 @@ TEST_F(CliScene, OptionsNameAnotherVolumeAndOtherCameras) {
                        "surfaces": [{"isovalue": 40, "color": "#DBBD87"}]})");
   render(kFuel + std::string("-i 40 -o ") + in("a.png"));
   render(kFuel + std::string("--scene ") + in("s.json") + " -o " + in("b.png"));
-  EXPECT_EQ(picture("b.png"), picture("a.png")) << "a view that the surface fills";
+  EXPECT_EQ(picture("b.png"), picture("a.png")) << "the default view";
   render(kFuel + std::string("-i 40 --orbit 2 -o ") + in("a.png"));
   render(kFuel + std::string("--scene ") + in("s.json") + " --orbit 2 -o " + in("b.png"));
   EXPECT_EQ(picture("b_view1.png"), picture("a_view1.png"));

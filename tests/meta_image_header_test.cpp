@@ -38,6 +38,15 @@ TEST_F(MetaImageFile, FlippedDirection) {
   }
 }
 
+TEST_F(MetaImageFile, AnatomicalOrientationSaysThatItIsAPatients) {
+  for (const std::string axes : {"RAI", "LPS", "???", "unknown", ""}) {
+    const std::string line = axes.empty() ? "" : "AnatomicalOrientation = " + axes + "\n";
+    write_file(folder_ / "a.mha", meta_image(line) + ramp());
+    EXPECT_EQ(open_volume(folder_ / "a.mha")->info().is_anatomical, axes == "RAI" || axes == "LPS")
+        << axes;
+  }
+}
+
 TEST_F(MetaImageFile, LengthsInOtherUnitsBecomeMillimetres) {
   for (const auto &[unit, millimetres] : {std::pair("um", 1e-3), {"cm", 10.0}, {"mm", 1.0}}) {
     write_file(folder_ / "a.mha",

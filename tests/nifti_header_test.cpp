@@ -35,6 +35,7 @@ TEST_F(NiftiFile, RasBecomesLps) {
     const auto reader = open_volume(folder_ / name);
     expect_geometry(reader->info());
     EXPECT_EQ(reader->info().type, VoxelType::kUint8);
+    EXPECT_TRUE(reader->info().is_anatomical);
     expect_ramp(*reader);
   }
 }

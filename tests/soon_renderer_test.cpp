@@ -52,8 +52,8 @@ class FakeRenderer : public Renderer {
     return std::vector<HitRecord>(rays_hit_);
   }
   Camera camera(std::span<const float>, std::optional<ImageSize> size,
-                std::uint32_t num_views) override {
-    return {.eye = {rays_hit_, size.value().width, num_views - 1}};
+                const Viewpoint &from) override {
+    return {.eye = {rays_hit_, size.value().width, from.num_views - 1}};
   }
   ImageSize size() const override { return size_; }
   std::vector<HitRecord> hits() override { return {}; }

@@ -45,11 +45,20 @@ TEST_F(NrrdFile, SpaceDirections) {
                                        ramp());
     const auto reader = open_volume(folder_ / "a.nrrd");
     expect_geometry(reader->info());
+    EXPECT_TRUE(reader->info().is_anatomical);
     expect_ramp(*reader);
   };
   read("right-anterior-superior", "(0.5,0,0) (0,-2,0) (0,0,3)", "(10,20,30)");
   read("left-posterior-superior", "(-0.5,0,0) (0,2,0) (0,0,3)", "(-10,-20,30)");
   read("LAS", "(-0.5,0,0) (0,-2,0) (0,0,3)", "(-10,20,30)");  // ITK takes its x for the one to flip
+}
+
+TEST_F(NrrdFile, OtherSpacesAreNoPatients) {
+  for (const std::string space :
+       {"space: scanner-xyz", "space: 3D-right-handed", "space dimension: 3", "spacings: 1 2 3"}) {
+    write_file(folder_ / "a.nrrd", nrrd(space + "\nencoding: raw\n\n") + ramp());
+    EXPECT_FALSE(open_volume(folder_ / "a.nrrd")->info().is_anatomical) << space;
+  }
 }
 
 /// Those that float64 holds, exactly.

@@ -207,20 +207,29 @@ Flip::Flip(const Image8 &reference, double pixels_per_degree)
 Flip::~Flip() = default;
 Flip::Flip(Flip &&) noexcept = default;
 
-double Flip::error(const Image8 &test) const {
+std::vector<double> Flip::errors(const Image8 &test) const {
   const View &a = *reference_;
   check_same_size(a, test);
   const View b = view_of(test, pixels_per_degree_);
-  std::vector<double> sums(a.height, 0.0);  // by row, so that it is the same sum always
+  std::vector<double> errors(a.colors.size());
   parallel_for(a.height, 0, [&](std::uint64_t row, std::uint32_t) {
     for (std::size_t i = row * a.width; i < (row + 1) * a.width; ++i) {
       const double color = color_error(hyab(a.colors[i], b.colors[i]));
       const double feature =
           std::max(std::abs(a.edges[i] - b.edges[i]), std::abs(a.points[i] - b.points[i]));
-      sums[row] += std::pow(color, 1 - std::sqrt(feature / std::numbers::sqrt2));
+      errors[i] = std::pow(color, 1 - std::sqrt(feature / std::numbers::sqrt2));
     }
   });
-  return std::accumulate(sums.begin(), sums.end(), 0.0) / double(a.colors.size());
+  return errors;
+}
+
+double Flip::error(const Image8 &test) const {
+  const std::vector<double> all = errors(test);
+  double sum = 0;
+  for (std::size_t row = 0; row < all.size(); row += test.width)  // sums of rows have small errors
+    sum += std::accumulate(all.begin() + std::ptrdiff_t(row),
+                           all.begin() + std::ptrdiff_t(row + test.width), 0.0);
+  return sum / double(all.size());
 }
 
 }  // namespace isowave::core

@@ -3,6 +3,7 @@
 // [13]).
 
 #include <memory>
+#include <vector>
 
 #include "core/io/png.hpp"
 
@@ -22,6 +23,8 @@ class Flip {
   ///
   /// Throws  Error: the images differ in size
   double error(const Image8 &test) const;
+  /// The error of each pixel [height][width].
+  std::vector<double> errors(const Image8 &test) const;
 
  private:
   struct View;

@@ -68,6 +68,23 @@ Camera public_camera(const core::Camera &camera) {
           camera.parallel_height};
 }
 
+core::Viewpoint core_viewpoint(const Viewpoint &from, std::uint32_t num_views) {
+  if (num_views == 0 || num_views > core::kMostViews)
+    throw core::Error("a turntable of {} views: give 1 to {}", num_views, core::kMostViews);
+  if (from.side > Side::kIso) throw core::Error("{} is no side", static_cast<int>(from.side));
+  const auto up = from.up ? std::optional(to_glm(*from.up)) : std::nullopt;
+  return {static_cast<core::Side>(from.side), up, from.zoom, num_views};
+}
+
+std::vector<Camera> public_turntable(const core::Camera &first, const core::VolumeInfo &info,
+                                     const core::Viewpoint &from) {
+  std::vector<Camera> cameras(from.num_views);
+  const glm::dvec3 axis = core::orientation_of(info, from.up).up;
+  std::ranges::transform(core::turntable(first, from.num_views, axis), cameras.begin(),
+                         public_camera);
+  return cameras;
+}
+
 core::Clip core_clip(const std::vector<ClipPlane> &planes, bool caps) {
   core::Clip clip{.caps = caps};
   for (const ClipPlane &plane : planes) clip.planes.push_back({to_glm(plane.normal), plane.offset});
@@ -377,6 +394,7 @@ void describe_frame(const FrameRequest &request, const core::FrameStats &stats, 
   const core::ImageSize size = core_size(frame.size);
   frame.rows = size.ray_rows();
   frame.columns = size.ray_columns();
+  frame.camera = request.camera;
   frame.statistics = public_statistics(stats, size.num_rays());
 }
 

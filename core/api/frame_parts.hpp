@@ -16,6 +16,12 @@ namespace isowave {
 core::ImageSize core_size(const ImageSize &size);
 core::Camera core_camera(const Camera &camera);
 Camera public_camera(const core::Camera &camera);
+core::Viewpoint core_viewpoint(const Viewpoint &from, std::uint32_t num_views);
+/// The views of a turntable.
+///
+/// first  as core_viewpoint() had it made
+std::vector<Camera> public_turntable(const core::Camera &first, const core::VolumeInfo &info,
+                                     const core::Viewpoint &from);
 core::Clip core_clip(const std::vector<ClipPlane> &planes, bool caps);
 /// A surface without its isovalue.
 ///

@@ -12,6 +12,7 @@
 #include "core/api/volume_implementation.hpp"
 #include "core/base/ms_since.hpp"
 #include "core/frame/colors.hpp"
+#include "core/frame/surface_camera.hpp"
 #include "core/io/file_name.hpp"
 #include "core/zfp/isovalue.hpp"
 
@@ -159,22 +160,28 @@ Frame Renderer::Implementation::cast_rays(std::span<const Ray> rays, double isov
 
 std::vector<Camera> Renderer::Implementation::turntable(const std::vector<Surface> &surfaces,
                                                         std::uint32_t num_views,
-                                                        std::optional<ImageSize> size) {
+                                                        std::optional<ImageSize> size,
+                                                        const Viewpoint &from) {
   return guarded("looking for the surface", [&] {
-    if (num_views == 0 || num_views > core::kMostViews)
-      throw core::Error("a turntable of {} views: give 1 to {}", num_views, core::kMostViews);
+    const core::Viewpoint viewpoint = core_viewpoint(from, num_views);
     const std::lock_guard lock(*turns_);
     const auto of = size ? std::optional(core_size(*size)) : std::nullopt;
     std::vector<double> isovalues(surfaces.size());
     std::ranges::transform(surfaces, isovalues.begin(), &Surface::isovalue);
     const std::vector<std::uint16_t> labels = labels_of(surfaces);
     const core::Camera first =
-        labels.empty() ? renderer_->camera(core::drawn_isovalues(volume_, isovalues), of, num_views)
-                       : renderer_->label_camera(labels, of, num_views);
-    std::vector<Camera> cameras(num_views);
-    std::ranges::transform(core::turntable(first, num_views), cameras.begin(), public_camera);
-    return cameras;
+        surfaces.empty() ? box_camera(of.value_or(renderer_->abilities().largest), viewpoint)
+        : labels.empty()
+            ? renderer_->camera(core::drawn_isovalues(volume_, isovalues), of, viewpoint)
+            : renderer_->label_camera(labels, of, viewpoint);
+    return public_turntable(first, whole(), viewpoint);
   });
+}
+
+core::Camera Renderer::Implementation::box_camera(core::ImageSize size,
+                                                  const core::Viewpoint &from) {
+  core::check_image_size(size);
+  return core::surface_camera(whole(), {}, size, from);
 }
 
 bool Renderer::Implementation::can_draw(const FrameRequest &request) const {
@@ -210,15 +217,20 @@ Frame Renderer::render(const FrameRequest &request) {
 Frame Renderer::cast_rays(std::span<const Ray> rays, double isovalue, Normals normals) {
   return implementation_->cast_rays(rays, isovalue, normals);
 }
-Camera Renderer::camera(double isovalue, std::optional<ImageSize> size) {
-  return implementation_->turntable({{.isovalue = isovalue}}, 1, size).front();
+Camera Renderer::camera(std::optional<ImageSize> size, const Viewpoint &from) {
+  return turntable({}, 1, size, from).front();
 }
-Camera Renderer::camera(const std::vector<Surface> &surfaces, std::optional<ImageSize> size) {
-  return turntable(surfaces, 1, size).front();
+Camera Renderer::camera(double isovalue, std::optional<ImageSize> size, const Viewpoint &from) {
+  return implementation_->turntable({{.isovalue = isovalue}}, 1, size, from).front();
+}
+Camera Renderer::camera(const std::vector<Surface> &surfaces, std::optional<ImageSize> size,
+                        const Viewpoint &from) {
+  return turntable(surfaces, 1, size, from).front();
 }
 std::vector<Camera> Renderer::turntable(const std::vector<Surface> &surfaces,
-                                        std::uint32_t num_views, std::optional<ImageSize> size) {
-  return implementation_->turntable(surfaces, num_views, size);
+                                        std::uint32_t num_views, std::optional<ImageSize> size,
+                                        const Viewpoint &from) {
+  return implementation_->turntable(surfaces, num_views, size, from);
 }
 bool Renderer::can_draw(const FrameRequest &request) const {
   return implementation_->can_draw(request);
@@ -268,6 +280,13 @@ core::Image8 image_of(const Frame &frame) {
   return {frame.size.width, frame.size.height, channels, frame.picture.to_vector()};
 }
 
+/// The frame's camera, as a camera file.
+std::string cameras_of(const Frame &frame) {
+  if (!frame.camera) return {};
+  const ImageSize &size = frame.size;
+  return core::camera_file_text({core_camera(*frame.camera)}, size.width, size.height);
+}
+
 }  // namespace
 
 std::array<ClipPlane, 6> box_planes(const Vector3 &begin, const Vector3 &end) {
@@ -293,14 +312,14 @@ void save_png(const Frame &frame, const std::filesystem::path &path) {
   guarded("saving a picture", [&] {
     core::check_png_name(path);
     if (frame.picture.empty()) throw core::Error("{}: the frame has no picture", path.string());
-    core::write_png(image_of(frame), path);
+    core::write_png(image_of(frame), path, cameras_of(frame));
   });
 }
 
 std::vector<std::uint8_t> encode_png(const Frame &frame) {
   return guarded("encoding a picture", [&] {
     if (frame.picture.empty()) throw core::Error("the frame has no picture");
-    return core::encode_png(image_of(frame));
+    return core::encode_png(image_of(frame), cameras_of(frame));
   });
 }
 

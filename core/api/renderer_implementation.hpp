@@ -39,7 +39,7 @@ struct Renderer::Implementation {
   Frame render(const FrameRequest &request);
   Frame cast_rays(std::span<const Ray> rays, double isovalue, Normals normals);
   std::vector<Camera> turntable(const std::vector<Surface> &surfaces, std::uint32_t num_views,
-                                std::optional<ImageSize> size);
+                                std::optional<ImageSize> size, const Viewpoint &from);
   bool can_draw(const FrameRequest &request) const;
   bool ready() const { return soon == nullptr || soon->ready(); }
   bool ready_for(const FrameRequest &request) const;
@@ -64,6 +64,7 @@ struct Renderer::Implementation {
   core::VolumeInfo whole() {
     return renderer_->team().size() > 1 ? renderer_->levels().front() : volume_.info;
   }
+  core::Camera box_camera(core::ImageSize size, const core::Viewpoint &from);
   Frame draw(const FrameRequest &request);
   void fetch(const FrameRequest &request, Frame &frame);
   /// For other threads, that may ask while a frame is drawn.

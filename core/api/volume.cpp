@@ -32,11 +32,7 @@ core::VoxelType core_type(VoxelType type) {
 }
 
 core::VolumeInfo core_info(const Grid &grid, VoxelType type) {
-  core::VolumeInfo info;
-  info.dims = {grid.dims[0], grid.dims[1], grid.dims[2]};
-  info.spacing = to_glm(grid.spacing);
-  info.origin = to_glm(grid.origin);
-  for (int axis = 0; axis < 3; ++axis) info.direction[axis] = to_glm(grid.direction.at(axis));
+  core::VolumeInfo info = core_grid(grid);
   info.type = core_type(type);
   return info;
 }
@@ -100,12 +96,23 @@ std::shared_ptr<const Volume> make_volume(core::CompressedVolume volume,
 
 }  // namespace
 
+core::VolumeInfo core_grid(const Grid &grid) {
+  core::VolumeInfo info;
+  info.dims = {grid.dims[0], grid.dims[1], grid.dims[2]};
+  info.spacing = to_glm(grid.spacing);
+  info.origin = to_glm(grid.origin);
+  for (int axis = 0; axis < 3; ++axis) info.direction[axis] = to_glm(grid.direction.at(axis));
+  info.is_anatomical = grid.is_anatomical;
+  return info;
+}
+
 Grid public_grid(const core::VolumeInfo &info) {
   Grid grid;
   grid.dims = {info.dims.x, info.dims.y, info.dims.z};
   grid.spacing = from_glm(info.spacing);
   grid.origin = from_glm(info.origin);
   for (int axis = 0; axis < 3; ++axis) grid.direction.at(axis) = from_glm(info.direction[axis]);
+  grid.is_anatomical = info.is_anatomical;
   return grid;
 }
 

@@ -19,6 +19,8 @@ struct Volume::Implementation {
 };
 
 Grid public_grid(const core::VolumeInfo &info);
+/// Unchecked, and without a type of voxels.
+core::VolumeInfo core_grid(const Grid &grid);
 core::RawOverrides to_overrides(const RawFile &raw);
 /// Throws  core::Error: a `.zfp` file cannot be compressed; several ways to compress
 core::Storage storage_for(const std::string &path, const Compression &compression);

@@ -149,11 +149,11 @@ bool TeamRenderer::show_round(const FrameRequest &request) {
 }
 
 Camera TeamRenderer::camera(std::span<const float> isovalues, std::optional<ImageSize> size,
-                            std::uint32_t num_views) {
+                            const Viewpoint &from) {
   std::optional<BlockBox> own;
   together(team_, [&] { own = renderer_.surface_box(isovalues); });
   return surface_camera(whole_levels_.front(), gather_box(team_, brick_, own),
-                        size.value_or(abilities().largest), num_views);
+                        size.value_or(abilities().largest), from);
 }
 
 /// The kept picture may fill own hits, but not those of all bricks.
@@ -168,12 +168,12 @@ void TeamRenderer::enlarge_kept(const FrameRequest &request) {
 }
 
 Camera TeamRenderer::label_camera(std::span<const std::uint16_t> labels,
-                                  std::optional<ImageSize> size, std::uint32_t num_views) {
-  if (!abilities().labels) return Renderer::label_camera(labels, size, num_views);
+                                  std::optional<ImageSize> size, const Viewpoint &from) {
+  if (!abilities().labels) return Renderer::label_camera(labels, size, from);
   std::optional<BlockBox> own;
   together(team_, [&] { own = renderer_.label_box(labels); });
   return surface_camera(whole_levels_.front(), gather_box(team_, brick_, own),
-                        size.value_or(abilities().largest), num_views);
+                        size.value_or(abilities().largest), from);
 }
 
 /// A light ray of each hit goes through the bricks of all ranks. A ray is open if it meets nothing

@@ -63,9 +63,9 @@ class TeamRenderer : public Renderer {
     return renderer_.cast_rays(rays, isovalue, normals);
   }
   Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {},
-                std::uint32_t num_views = 1) override;
+                const Viewpoint &from = {}) override;
   Camera label_camera(std::span<const std::uint16_t> labels, std::optional<ImageSize> size = {},
-                      std::uint32_t num_views = 1) override;
+                      const Viewpoint &from = {}) override;
   bool has_field_values() const override { return renderer_.has_field_values(); }
   std::optional<std::array<float, 2>> field_range() override;
 

@@ -182,7 +182,7 @@ Shading Renderer::shading_of(const VolumeInfo &info, const Appearance &appearanc
 }
 
 Camera Renderer::label_camera(std::span<const std::uint16_t>, std::optional<ImageSize>,
-                              std::uint32_t) {
+                              const Viewpoint &) {
   throw Error("{}", kDrawsNoLabels);
 }
 

@@ -95,18 +95,18 @@ class Renderer {
                                            Normals normals) = 0;
 
   /// A view in which isosurfaces fill a picture of that size, see surface_camera(); no size: the
-  /// largest.
+  /// largest. No isovalues, or none that has a surface: the whole volume fills the picture.
   ///
-  /// num_views  of turntable(). Returns the first of them; the surfaces stay in the picture in all
-  /// Throws     Error: an isovalue is NaN
+  /// from    of several views, the first is returned, and the surfaces stay in all pictures
+  /// Throws  Error: an isovalue is NaN; what camera_of_box() throws
   virtual Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {},
-                        std::uint32_t num_views = 1) = 0;
+                        const Viewpoint &from = {}) = 0;
 
   /// The same for the surface of labels.
   ///
   /// Throws  Error: no ability for labels
   virtual Camera label_camera(std::span<const std::uint16_t> labels,
-                              std::optional<ImageSize> size = {}, std::uint32_t num_views = 1);
+                              std::optional<ImageSize> size = {}, const Viewpoint &from = {});
 
   // These functions return the last frame, or within on_pass the frame at work. Rank 0 of a team
   // gets the frame, and other ranks get empty ones. All of them wait, and throw Error if no frame
@@ -182,12 +182,12 @@ class RendererAround : public Renderer {
     return inner().cast_rays(rays, isovalue, normals);
   }
   Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {},
-                std::uint32_t num_views = 1) override {
-    return inner().camera(isovalues, size, num_views);
+                const Viewpoint &from = {}) override {
+    return inner().camera(isovalues, size, from);
   }
   Camera label_camera(std::span<const std::uint16_t> labels, std::optional<ImageSize> size = {},
-                      std::uint32_t num_views = 1) override {
-    return inner().label_camera(labels, size, num_views);
+                      const Viewpoint &from = {}) override {
+    return inner().label_camera(labels, size, from);
   }
   ImageSize size() const override { return inner().size(); }
   FrameArrays fetch(const WantedArrays &wanted, const Appearance &appearance) override {

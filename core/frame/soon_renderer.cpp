@@ -102,13 +102,13 @@ std::vector<HitRecord> SoonRenderer::cast_rays(std::span<const WorldRay> rays, f
 }
 
 Camera SoonRenderer::camera(std::span<const float> isovalues, std::optional<ImageSize> size,
-                            std::uint32_t num_views) {
-  return find_any().camera(isovalues, size.value_or(parts_.abilities.largest), num_views);
+                            const Viewpoint &from) {
+  return find_any().camera(isovalues, size.value_or(parts_.abilities.largest), from);
 }
 
 Camera SoonRenderer::label_camera(std::span<const std::uint16_t> labels,
-                                  std::optional<ImageSize> size, std::uint32_t num_views) {
-  return find_any().label_camera(labels, size.value_or(parts_.abilities.largest), num_views);
+                                  std::optional<ImageSize> size, const Viewpoint &from) {
+  return find_any().label_camera(labels, size.value_or(parts_.abilities.largest), from);
 }
 
 void SoonRenderer::clear_cache() {

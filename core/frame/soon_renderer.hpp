@@ -63,9 +63,9 @@ class SoonRenderer : public RendererAround {
   std::vector<HitRecord> cast_rays(std::span<const WorldRay> rays, float isovalue,
                                    Normals normals) override;
   Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {},
-                std::uint32_t num_views = 1) override;
+                const Viewpoint &from = {}) override;
   Camera label_camera(std::span<const std::uint16_t> labels, std::optional<ImageSize> size = {},
-                      std::uint32_t num_views = 1) override;
+                      const Viewpoint &from = {}) override;
   void clear_cache() override;
   /// Memory of the renderer that took long, after its last call; 0 before it is ready.
   std::uint64_t memory_bytes() const override { return is_ready_ ? memory_bytes_.load() : 0; }

@@ -1,5 +1,5 @@
 #pragma once
-// The view that is taken if a user asks for no other.
+// Views that surfaces, or the whole volume, fill.
 
 #include <optional>
 
@@ -9,12 +9,11 @@
 
 namespace isowave::core {
 
-/// A view in which a box of blocks fills a picture of that size, from the direction in which
-/// orbit_cameras() begins.
+/// A view in which a box of blocks fills a picture of that size.
 ///
-/// box        the box around the blocks that the surface may be in; none: the whole volume
-/// num_views  in each view of turntable(), the box is in the picture
+/// box     the box around the blocks that the surface may be in; none: the whole volume
+/// Throws  Error: what camera_of_box() throws
 Camera surface_camera(const VolumeInfo &info, const std::optional<BlockBox> &box, ImageSize size,
-                      std::uint32_t num_views = 1);
+                      const Viewpoint &from = {});
 
 }  // namespace isowave::core

@@ -480,7 +480,7 @@ std::vector<HitRecord> HostRenderer::cast_rays(std::span<const WorldRay> rays, f
 }
 
 Camera HostRenderer::camera(std::span<const float> isovalues, std::optional<ImageSize> size,
-                            std::uint32_t num_views) {
+                            const Viewpoint &from) {
   const ImageSize of_picture = size.value_or(abilities().largest);
   check_image_size(of_picture);
   std::optional<BlockBox> box;
@@ -492,16 +492,16 @@ Camera HostRenderer::camera(std::span<const float> isovalues, std::optional<Imag
     box->begin = glm::min(box->begin, blocks->begin);
     box->end = glm::max(box->end, blocks->end);
   }
-  return surface_camera(info_, box, of_picture, num_views);
+  return surface_camera(info_, box, of_picture, from);
 }
 
 Camera HostRenderer::label_camera(std::span<const std::uint16_t> labels,
-                                  std::optional<ImageSize> size, std::uint32_t num_views) {
+                                  std::optional<ImageSize> size, const Viewpoint &from) {
   const ImageSize of_picture = size.value_or(abilities().largest);
   check_image_size(of_picture);
   check_labels(volume_);
   checked_limit(volume_, memory_limit_, 1, HostLevels::bytes_of_labels(info_, 1));
-  return surface_camera(info_, levels_.label_box(labels), of_picture, num_views);
+  return surface_camera(info_, levels_.label_box(labels), of_picture, from);
 }
 
 void HostRenderer::keep_picture() {

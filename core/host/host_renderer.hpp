@@ -54,10 +54,10 @@ class HostRenderer : public Renderer {
   std::vector<HitRecord> cast_rays(std::span<const WorldRay> rays, float isovalue,
                                    Normals normals) override;
   Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {},
-                std::uint32_t num_views = 1) override;
+                const Viewpoint &from = {}) override;
 
   Camera label_camera(std::span<const std::uint16_t> labels, std::optional<ImageSize> size = {},
-                      std::uint32_t num_views = 1) override;
+                      const Viewpoint &from = {}) override;
 
   ImageSize size() const override { return size_; }
   std::vector<HitRecord> hits() override;

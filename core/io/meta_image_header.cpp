@@ -157,6 +157,10 @@ std::size_t read_meta_dims(const HeaderFields &fields, const std::string &what, 
 void set_meta_geometry(const HeaderFields &fields, std::size_t num_axes, const std::string &what,
                        VolumeHeader &header) {
   VolumeInfo &info = header.info;
+  // ITK's world is LPS; its files name the axes, as "RAI", or "???" if a body has no such axes.
+  const std::string axes =
+      fields.has("AnatomicalOrientation") ? fields["AnatomicalOrientation"] : "";
+  info.is_anatomical = axes.size() == 3 && axes.find_first_not_of("RLAPIS") == std::string::npos;
   double unit = 1;
   if (fields.has("DistanceUnits"))
     unit = millimetres_in(std::array{fields["DistanceUnits"]}, "DistanceUnits", what, header)[0];

@@ -269,6 +269,7 @@ void set_nifti_geometry(const NiftiHeader &header, const std::string &what, Volu
   info.spacing = spacing * millimetres;
   const std::optional<Placement> placement = read_placement(header, what, spacing, result);
   if (!placement) return;
+  info.is_anatomical = true;
   info.spacing = placement->spacing * millimetres;
   const glm::dvec3 to_lps(-1, -1, 1);
   for (int axis = 0; axis < 3; ++axis)

@@ -250,29 +250,30 @@ std::vector<NrrdAxis> read_nrrd_axes(const HeaderFields &fields) {
   return axes;
 }
 
-/// Factors that turn coordinates of the file's space into LPS. Empty if it has no space.
-std::optional<glm::dvec3> read_nrrd_space(const HeaderFields &fields) {
-  struct Space {
-    std::string_view name, short_name;
-    glm::dvec3 to_lps;
-  };
-  const std::array<Space, 6> spaces{{{"right-anterior-superior", "ras", {-1, -1, 1}},
-                                     {"left-anterior-superior", "las", {1, -1, 1}},
-                                     {"left-posterior-superior", "lps", {1, 1, 1}},
-                                     {"scanner-xyz", "", {1, 1, 1}},
-                                     {"3d-right-handed", "", {1, 1, 1}},
-                                     {"3d-left-handed", "", {1, 1, 1}}}};
+struct NrrdSpace {
+  std::string_view name{}, short_name{};
+  glm::dvec3 to_lps{1.0};  ///< factors that turn coordinates of the file's space into LPS
+  bool is_anatomical = false;
+};
+
+/// Empty if the file has no space.
+std::optional<NrrdSpace> read_nrrd_space(const HeaderFields &fields) {
+  const std::array<NrrdSpace, 6> spaces{{{"right-anterior-superior", "ras", {-1, -1, 1}, true},
+                                         {"left-anterior-superior", "las", {1, -1, 1}, true},
+                                         {"left-posterior-superior", "lps", {1, 1, 1}, true},
+                                         {"scanner-xyz", "", {1, 1, 1}},
+                                         {"3d-right-handed", "", {1, 1, 1}},
+                                         {"3d-left-handed", "", {1, 1, 1}}}};
   if (!fields.has("space")) {
     if (!fields.has("space dimension")) return std::nullopt;
     if (fields.integer("space dimension") != 3)
       fields.fail("space dimension", "not supported: need 3");
-    return glm::dvec3(1.0);
+    return NrrdSpace{};
   }
   if (fields.has("space dimension")) fields.fail("space dimension", "given beside 'space'");
   const std::string wanted = lower_case(fields["space"]);
-  for (const Space &space : spaces) {
-    if (!wanted.empty() && (wanted == space.name || wanted == space.short_name))
-      return space.to_lps;
+  for (const NrrdSpace &space : spaces) {
+    if (!wanted.empty() && (wanted == space.name || wanted == space.short_name)) return space;
   }
   fields.fail("space", "not supported: need one of 3 dimensions");
 }
@@ -309,9 +310,10 @@ std::vector<NrrdAxis> volume_axes(const HeaderFields &fields, std::vector<NrrdAx
 }
 
 void set_geometry_in_space(const HeaderFields &fields, const std::vector<NrrdAxis> &axes,
-                           const glm::dvec3 &to_lps, const std::string &what,
-                           VolumeHeader &header) {
+                           const NrrdSpace &space, const std::string &what, VolumeHeader &header) {
   VolumeInfo &info = header.info;
+  info.is_anatomical = space.is_anatomical;
+  const glm::dvec3 &to_lps = space.to_lps;
   glm::dvec3 unit(1.0);  // of the space's axes
   if (fields.has("space units")) {
     const std::vector<std::string> names = parse_quoted(fields, "space units", 3);
@@ -427,8 +429,8 @@ VolumeHeader read_nrrd_header(const std::shared_ptr<const InputFile> &file) {
   std::uint32_t num_steps = 1;
   const std::vector<NrrdAxis> axes = volume_axes(fields, read_nrrd_axes(fields), what, num_steps);
   for (int i = 0; i < 3; ++i) header.info.dims[i] = std::uint32_t(axes[std::size_t(i)].size);
-  if (const std::optional<glm::dvec3> to_lps = read_nrrd_space(fields)) {
-    set_geometry_in_space(fields, axes, *to_lps, what, header);
+  if (const std::optional<NrrdSpace> space = read_nrrd_space(fields)) {
+    set_geometry_in_space(fields, axes, *space, what, header);
   } else {
     set_geometry_by_axes(fields, axes, what, header);
   }

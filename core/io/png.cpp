@@ -1,10 +1,13 @@
 #include "core/io/png.hpp"
 
 #include <png.h>
+#include <zlib.h>
 
+#include <array>
 #include <csetjmp>
 #include <cstdio>
 #include <cstring>
+#include <fstream>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -114,9 +117,26 @@ png_image describe(const Image8 &image) {
   return png;
 }
 
+// A text chunk before the last one, which is always the same: libpng's simplified interface writes
+// no texts.
+constexpr std::string_view kTextKey{"tEXtisowave cameras\0", 20};
+constexpr std::size_t kEndBytes = 12, kMostTextBytes = 1u << 20;
+
+std::string big_endian(std::size_t number) {
+  std::string bytes;
+  for (int shift = 24; shift >= 0; shift -= 8) bytes += static_cast<char>(number >> shift & 0xff);
+  return bytes;
+}
+
+std::string text_chunk(std::string_view text) {
+  const std::string body = std::string(kTextKey) + std::string(text);
+  const auto *bytes = reinterpret_cast<const Bytef *>(body.data());
+  return big_endian(body.size() - 4) + body + big_endian(::crc32_z(0, bytes, body.size()));
+}
+
 }  // namespace
 
-std::vector<std::uint8_t> encode_png(const Image8 &image) {
+std::vector<std::uint8_t> encode_png(const Image8 &image, std::string_view cameras) {
   png_image png = describe(image);
   png_alloc_size_t num_bytes = PNG_IMAGE_PNG_SIZE_MAX(png);
   std::vector<std::uint8_t> bytes(num_bytes);
@@ -125,17 +145,46 @@ std::vector<std::uint8_t> encode_png(const Image8 &image) {
     throw Error("cannot make a PNG of the picture: {}", png.message);
   }
   bytes.resize(num_bytes);
+  const std::string text = cameras.empty() ? std::string() : text_chunk(cameras);
+  bytes.insert(bytes.end() - std::ptrdiff_t{kEndBytes}, text.begin(), text.end());
   return bytes;
 }
 
-void write_png(const Image8 &image, const std::filesystem::path &path) {
+void write_png(const Image8 &image, const std::filesystem::path &path, std::string_view cameras) {
   AtomicFile out(path);
   png_image png = describe(image);
   if (png_image_write_to_stdio(&png, out.stream(), kAsItIs, image.pixels.data(),
                                kRowsFollowEachOther, nullptr) == 0) {
     throw Error("{}: cannot write the PNG: {}", path.string(), png.message);
   }
+  constexpr auto kBack = -static_cast<long>(kEndBytes);
+  if (!cameras.empty() && std::fseek(out.stream(), kBack, SEEK_END) == 0) {  // not in pipes
+    out.write(text_chunk(cameras));
+    out.write(std::string_view("\0\0\0\0IEND\xae\x42\x60\x82", kEndBytes));
+  }
   out.commit();
+}
+
+std::optional<std::string> cameras_of_png(const std::filesystem::path &path) {
+  check_input_file(path);
+  std::ifstream in(path, std::ios::binary);
+  if (!in) throw Error("{}: cannot open", path.string());
+  in.seekg(kSignatureBytes);
+  for (std::array<char, 8> head{}; in.read(head.data(), head.size());) {
+    std::size_t length = 0;
+    for (std::size_t i = 0; i < 4; ++i)
+      length = length << 8 | static_cast<unsigned char>(head.at(i));
+    std::string body(head.data() + 4, 4);
+    if (body != kTextKey.substr(0, 4) || length > kMostTextBytes) {
+      in.seekg(static_cast<std::streamoff>(length) + 4, std::ios::cur);
+      continue;
+    }
+    body.resize(4 + length);
+    if (!in.read(body.data() + 4, static_cast<std::streamsize>(length))) break;
+    if (body.starts_with(kTextKey)) return body.substr(kTextKey.size());
+    in.seekg(4, std::ios::cur);
+  }
+  return std::nullopt;
 }
 
 Image8 read_png(const std::filesystem::path &path) {

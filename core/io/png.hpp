@@ -3,6 +3,9 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
 #include <vector>
 
 namespace isowave::core {
@@ -17,12 +20,19 @@ struct Image8 {
 
 /// Writes losslessly, to a temporary name that is renamed.
 ///
+/// cameras  text of a camera file, for who compares pictures; empty: the file has none
 /// Throws  Error: it cannot write, or a side is 0 or above PNG's limit; std::invalid_argument:
 ///         channels or the length of pixels is wrong
-void write_png(const Image8 &image, const std::filesystem::path &path);
+void write_png(const Image8 &image, const std::filesystem::path &path,
+               std::string_view cameras = {});
+
+/// The cameras that write_png() was given; none: the file has none.
+///
+/// Throws  Error: unreadable
+std::optional<std::string> cameras_of_png(const std::filesystem::path &path);
 
 /// The bytes of such a file.
-std::vector<std::uint8_t> encode_png(const Image8 &image);
+std::vector<std::uint8_t> encode_png(const Image8 &image, std::string_view cameras = {});
 
 /// Reads 8-bit RGB and RGBA as they are; grey, palette and fewer bits are widened without loss.
 ///

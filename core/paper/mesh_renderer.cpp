@@ -335,8 +335,8 @@ std::vector<HitRecord> MeshRenderer::cast_rays(std::span<const WorldRay>, float,
 }
 
 Camera MeshRenderer::camera(std::span<const float> isovalues, std::optional<ImageSize> size,
-                            std::uint32_t num_views) {
-  return HostRenderer(volume_).camera(isovalues, size.value_or(options_.size), num_views);
+                            const Viewpoint &from) {
+  return HostRenderer(volume_).camera(isovalues, size.value_or(options_.size), from);
 }
 
 std::vector<HitRecord> MeshRenderer::hits() {

@@ -72,7 +72,7 @@ class MeshRenderer : public Renderer {
   std::vector<HitRecord> cast_rays(std::span<const WorldRay> rays, float isovalue,
                                    Normals normals) override;
   Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {},
-                std::uint32_t num_views = 1) override;
+                const Viewpoint &from = {}) override;
 
   /// Statistics of the last frame; zeros if there was none.
   const MeshFrameStats &last_frame() const { return last_; }

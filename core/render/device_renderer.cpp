@@ -423,9 +423,9 @@ std::optional<BlockBox> DeviceRenderer::surface_box(std::span<const float> isova
 }
 
 Camera DeviceRenderer::camera(std::span<const float> isovalues, std::optional<ImageSize> size,
-                              std::uint32_t num_views) {
+                              const Viewpoint &from) {
   return surface_camera(blocks_.levels[0].info, surface_box(isovalues),
-                        size.value_or(options_.size), num_views);
+                        size.value_or(options_.size), from);
 }
 
 std::optional<BlockBox> DeviceRenderer::label_box(std::span<const std::uint16_t> labels) {
@@ -436,10 +436,10 @@ std::optional<BlockBox> DeviceRenderer::label_box(std::span<const std::uint16_t>
 }
 
 Camera DeviceRenderer::label_camera(std::span<const std::uint16_t> labels,
-                                    std::optional<ImageSize> size, std::uint32_t num_views) {
-  if (!options_.with_labels) return Renderer::label_camera(labels, size, num_views);
+                                    std::optional<ImageSize> size, const Viewpoint &from) {
+  if (!options_.with_labels) return Renderer::label_camera(labels, size, from);
   return surface_camera(blocks_.levels[0].info, label_box(labels), size.value_or(options_.size),
-                        num_views);
+                        from);
 }
 
 std::vector<HitRecord> DeviceRenderer::cast_rays(std::span<const WorldRay> world_rays,

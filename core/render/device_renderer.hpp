@@ -68,9 +68,9 @@ class DeviceRenderer : public Renderer {
   std::optional<BlockBox> label_box(std::span<const std::uint16_t> labels);
 
   Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {},
-                std::uint32_t num_views = 1) override;
+                const Viewpoint &from = {}) override;
   Camera label_camera(std::span<const std::uint16_t> labels, std::optional<ImageSize> size = {},
-                      std::uint32_t num_views = 1) override;
+                      const Viewpoint &from = {}) override;
   std::vector<HitRecord> cast_rays(std::span<const WorldRay> rays, float isovalue,
                                    Normals normals) override;
 

@@ -1,5 +1,7 @@
 #include "core/view/camera.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/gtc/quaternion.hpp>
 #include <limits>
@@ -99,10 +101,12 @@ void check_camera(const Camera &camera, std::string_view what) {
   }
 }
 
-Camera turned(const Camera &camera, double degrees) {
-  const glm::dquat turn = glm::angleAxis(glm::radians(degrees), glm::normalize(camera.up));
+Camera turned(const Camera &camera, double degrees, const std::optional<glm::dvec3> &axis) {
+  const glm::dvec3 about = axis.value_or(camera.up);
+  const glm::dquat turn = glm::angleAxis(glm::radians(degrees), glm::normalize(about));
   Camera result = camera;
   result.eye = camera.at + turn * (camera.eye - camera.at);
+  if (about != camera.up) result.up = turn * camera.up;
   return result;
 }
 
@@ -144,10 +148,9 @@ double pixel_size_at(const Camera &camera, std::uint32_t height, double distance
   return distance * (2.0 * std::tan(glm::radians(camera.fovy_deg) / 2) / height);
 }
 
-CameraFile read_camera_file(const std::filesystem::path &path) {
-  const std::string where = path.string();
-  const json root = read_json(path, "camera file", kMostBytes);
+namespace {
 
+CameraFile camera_file_of(const json &root, const std::string &where) {
   CameraFile file;
   const double fovy_deg = number(member(root, "fovy_deg", where), "fovy_deg", where);
   if (root.contains("dims")) file.dims = size3(root["dims"], "dims", where);
@@ -177,6 +180,61 @@ CameraFile read_camera_file(const std::filesystem::path &path) {
   return file;
 }
 
+}  // namespace
+
+CameraFile read_camera_file(const std::filesystem::path &path) {
+  return camera_file_of(read_json(path, "camera file", kMostBytes), path.string());
+}
+
+CameraFile parse_camera_file(std::string_view text, const std::string &where) {
+  return camera_file_of(parse_json(text, where, "camera file"), where);
+}
+
+std::string camera_file_text(const std::vector<Camera> &cameras, std::uint32_t width,
+                             std::uint32_t height) {
+  using nlohmann::ordered_json;
+  const auto list = [](const glm::dvec3 &v) { return ordered_json{v.x, v.y, v.z}; };
+  ordered_json entries = ordered_json::array();
+  for (const Camera &camera : cameras) {
+    if (camera.fovy_deg != cameras.front().fovy_deg)
+      throw Error("a camera file has one fovy_deg for all cameras, and these have {} and {}",
+                  cameras.front().fovy_deg, camera.fovy_deg);
+    ordered_json entry = {
+        {"eye", list(camera.eye)}, {"at", list(camera.at)}, {"up", list(camera.up)}};
+    if (camera.parallel_height) entry["parallel_height"] = *camera.parallel_height;
+    entries.push_back(entry);
+  }
+  const ordered_json file = {{"width", width},
+                             {"height", height},
+                             {"fovy_deg", cameras.at(0).fovy_deg},
+                             {"cameras", entries}};
+  return file.dump() + "\n";
+}
+
+Orientation orientation_of(const VolumeInfo &info, const std::optional<glm::dvec3> &up) {
+  // A patient's world is LPS: +x left, +y posterior, +z superior.
+  Orientation result = info.is_anatomical ? Orientation{{1, 0, 0}, {0, 0, 1}, {0, -1, 0}}
+                                          : Orientation{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  if (!up) return result;
+  const double length = glm::length(*up);
+  if (!(length > 1 / kLongest && length < kLongest))
+    throw Error("up is {} {} {}: give a direction", up->x, up->y, up->z);
+  const glm::dvec3 to = *up / length;
+  const double cosine = glm::dot(result.up, to);
+  if (cosine < -1 + 1e-12) {  // upside down: what is in front stays there
+    result.right = -result.right;
+  } else {
+    const glm::dvec3 axis = glm::cross(result.up, to);  // as long as the angle's sine
+    const auto turn = [&](const glm::dvec3 &v) {
+      return cosine * v + glm::cross(axis, v) + axis * (glm::dot(axis, v) / (1 + cosine)) + 0.0;
+    };
+    result.right = turn(result.right);
+    result.front = turn(result.front);
+  }
+  result.up = to;
+  return result;
+}
+
 namespace {
 
 constexpr double kElevation = 20.0 * std::numbers::pi / 180.0, kFirstAzimuth = 0.3;
@@ -187,54 +245,147 @@ double azimuth_of(std::uint32_t view, std::uint32_t num_views) {
 }
 
 /// From the point looked at, of length 1.
-glm::dvec3 towards_eye(double azimuth) {
-  return {std::cos(kElevation) * std::sin(azimuth), std::sin(kElevation),
-          std::cos(kElevation) * std::cos(azimuth)};
+glm::dvec3 towards_eye(const Orientation &to, double azimuth) {
+  return std::cos(kElevation) * std::sin(azimuth) * to.right + std::sin(kElevation) * to.up +
+         std::cos(kElevation) * std::cos(azimuth) * to.front;
+}
+
+/// A view from a side: its `up`, and from the point looked at towards the eye, of length 1.
+struct ViewDirection {
+  glm::dvec3 back, up;
+};
+
+ViewDirection view_direction(const VolumeInfo &info, const Orientation &to, Side side) {
+  // The patient's own right is at the left of one who is looked at from the front.
+  const glm::dvec3 own_right = info.is_anatomical ? -to.right : to.right;
+  switch (side) {
+    case Side::kFront:
+      return {to.front, to.up};
+    case Side::kBack:
+      return {-to.front, to.up};
+    case Side::kLeft:
+      return {-own_right, to.up};
+    case Side::kRight:
+      return {own_right, to.up};
+    case Side::kTop:
+      return {to.up, -to.front};
+    case Side::kBottom:
+      return {-to.up, to.front};
+    case Side::kIso:
+      return {glm::normalize(to.right + to.up + to.front), to.up};
+    case Side::kCorner:
+      break;
+  }
+  return {towards_eye(to, kFirstAzimuth), to.up};
+}
+
+glm::dvec3 turned_about(const glm::dvec3 &axis, const glm::dvec3 &v, double angle) {
+  const glm::dvec3 along = axis * glm::dot(axis, v);
+  return along + std::cos(angle) * (v - along) + std::sin(angle) * glm::cross(axis, v);
+}
+
+/// World vectors from a box's centre to its corners.
+std::array<glm::dvec3, 8> corners_of(const VolumeInfo &info, const glm::dvec3 &size) {
+  std::array<glm::dvec3, 8> corners{};
+  for (std::size_t corner = 0; corner < 8; ++corner) {
+    const glm::dvec3 half(corner & 1 ? 0.5 : -0.5, corner & 2 ? 0.5 : -0.5,
+                          corner & 4 ? 0.5 : -0.5);
+    corners[corner] = info.index_to_world() * (half * size);
+  }
+  return corners;
+}
+
+/// Distance from which each corner is within kMargin of the picture, or its mirror image on the
+/// other side.
+///
+/// tan_v  of half the vertical angle
+double distance_to_fit(const std::array<glm::dvec3, 8> &corners, const ViewDirection &from,
+                       double tan_v, double aspect) {
+  const double v = kMargin * tan_v, u = aspect * v;
+  const glm::dvec3 right = glm::normalize(glm::cross(from.up, from.back)),
+                   above = glm::cross(from.back, right);
+  double distance = 0;
+  for (const glm::dvec3 &at : corners) {
+    const double nearer = glm::dot(at, from.back);
+    distance = std::max({distance, nearer + std::abs(glm::dot(at, right)) / u,
+                         nearer + std::abs(glm::dot(at, above)) / v});
+  }
+  return distance;
 }
 
 }  // namespace
 
 Camera camera_of_box(const VolumeInfo &info, const glm::dvec3 &begin, const glm::dvec3 &end,
-                     double aspect, std::uint32_t num_views, double margin) {
-  const glm::dmat3 to_world = info.index_to_world();
-  const glm::dvec3 up(0.0, 1.0, 0.0);
-  const glm::dvec3 centre = info.origin + to_world * (0.5 * (begin + end));
-  const double tan_v = margin * std::tan(glm::radians(kFovyDeg) / 2), tan_u = aspect * tan_v;
-  // From so far that each corner is within the picture, or its mirror image on the other side.
+                     double aspect, const Viewpoint &from) {
+  const Orientation orientation = orientation_of(info, from.up);
+  const ViewDirection first = view_direction(info, orientation, from.side);
+  const glm::dvec3 centre = info.origin + info.index_to_world() * (0.5 * (begin + end));
+  const std::array<glm::dvec3, 8> corners = corners_of(info, end - begin);
+  const double tan_v = std::tan(glm::radians(kFovyDeg) / 2);
   double distance = 0;
-  for (std::uint32_t view = 0; view < num_views; ++view) {
-    const glm::dvec3 back = towards_eye(azimuth_of(view, num_views));
-    const glm::dvec3 right = glm::normalize(glm::cross(up, back)), above = glm::cross(back, right);
-    for (int corner = 0; corner < 8; ++corner) {
-      const glm::dvec3 half(corner & 1 ? 0.5 : -0.5, corner & 2 ? 0.5 : -0.5,
-                            corner & 4 ? 0.5 : -0.5);
-      const glm::dvec3 at = to_world * (half * (end - begin));
-      const double nearer = glm::dot(at, back);
-      distance = std::max({distance, nearer + std::abs(glm::dot(at, right)) / tan_u,
-                           nearer + std::abs(glm::dot(at, above)) / tan_v});
-    }
+  for (std::uint32_t view = 0; view < from.num_views; ++view) {
+    const double angle = 2.0 * std::numbers::pi * view / from.num_views;
+    const ViewDirection turned{turned_about(orientation.up, first.back, angle),
+                               turned_about(orientation.up, first.up, angle)};
+    distance =
+        std::max(distance, distance_to_fit(corners, view == 0 ? first : turned, tan_v, aspect));
   }
-  return {centre + distance * towards_eye(kFirstAzimuth), centre, up, kFovyDeg};
+  return zoomed({centre + distance * first.back, centre, first.up, kFovyDeg}, from.zoom);
 }
 
-std::vector<Camera> turntable(const Camera &first, std::uint32_t n) {
+Camera fitted(const Camera &camera, const VolumeInfo &info, double aspect) {
+  check_camera(camera, "the camera");
+  const glm::dvec3 size(info.dims - 1u);
+  const CameraAxes axes = axes_of(camera);
+  const std::array<glm::dvec3, 8> corners = corners_of(info, size);
+  Camera result = camera;
+  result.at = info.origin + info.index_to_world() * (0.5 * size);
+  double distance = distance_to_fit(corners, {-axes.forward, axes.up},
+                                    std::tan(glm::radians(camera.fovy_deg) / 2), aspect);
+  if (camera.parallel_height) {
+    double half = 0, depth = 0;
+    for (const glm::dvec3 &at : corners) {
+      half = std::max(
+          {half, std::abs(glm::dot(at, axes.up)), std::abs(glm::dot(at, axes.right)) / aspect});
+      depth = std::max(depth, glm::length(at));
+    }
+    result.parallel_height = 2 * half / kMargin;
+    distance = 2 * depth;  // the eye's plane is in front of the box
+  }
+  result.eye = result.at - distance * axes.forward;
+  return result;
+}
+
+Camera zoomed(const Camera &camera, double zoom) {
+  if (!(zoom >= 0.01 && zoom <= 1000)) throw Error("a zoom of {}: give 0.01 to 1000", zoom);
+  Camera result = camera;
+  if (zoom == 1) return result;
+  result.fovy_deg = glm::degrees(2 * std::atan(std::tan(glm::radians(camera.fovy_deg) / 2) / zoom));
+  if (camera.parallel_height) result.parallel_height = *camera.parallel_height / zoom;
+  return result;
+}
+
+std::vector<Camera> turntable(const Camera &first, std::uint32_t n,
+                              const std::optional<glm::dvec3> &axis) {
   std::vector<Camera> cameras{first};
-  for (std::uint32_t k = 1; k < n; ++k) cameras.push_back(turned(first, 360.0 * k / n));
+  for (std::uint32_t k = 1; k < n; ++k) cameras.push_back(turned(first, 360.0 * k / n, axis));
   return cameras;
 }
 
-std::vector<Camera> orbit_cameras(const VolumeInfo &info, std::uint32_t n) {
+std::vector<Camera> orbit_cameras(const VolumeInfo &info, std::uint32_t n,
+                                  const std::optional<glm::dvec3> &up, double aspect) {
   const glm::dmat3 index_to_world = info.index_to_world();
+  const Orientation to = orientation_of(info, up);
   const glm::dvec3 extent(info.dims - 1u);
   const glm::dvec3 centre = info.origin + index_to_world * (0.5 * extent);
   // A sheared box has four different diagonals: the one from the first to the last voxel counts.
-  const double distance = 0.8 * glm::length(index_to_world * extent);
+  const double distance = 0.8 * glm::length(index_to_world * extent) * std::max(1.0, 1.0 / aspect);
 
   std::vector<Camera> cameras;
   cameras.reserve(n);
   for (std::uint32_t k = 0; k < n; ++k) {
     cameras.push_back(
-        {centre + distance * towards_eye(azimuth_of(k, n)), centre, {0.0, 1.0, 0.0}, kFovyDeg});
+        {centre + distance * towards_eye(to, azimuth_of(k, n)), centre, to.up, kFovyDeg});
   }
   return cameras;
 }

@@ -82,6 +82,8 @@ struct VolumeInfo {
   glm::dmat3 direction{1.0};  ///< column a: unit world direction of index axis a
   VoxelType type = VoxelType::kFloat32;  ///< as stored in the source file
   BrickOf brick{};
+  /// World space is a patient's, LPS: +x left, +y posterior, +z superior.
+  bool is_anatomical = false;
 
   std::uint64_t num_voxels() const { return std::uint64_t(dims.x) * dims.y * dims.z; }
   /// World vector of one index step along each axis, as columns: direction * diag(spacing).

@@ -81,6 +81,7 @@ ZfpLayout apply_json(const json &trailer, CompressedVolume &volume) {
   for (int column = 0; column < 3; ++column) {
     volume.info.direction[column] = vector_from(trailer.at("direction").at(std::size_t(column)));
   }
+  volume.info.is_anatomical = trailer.value("space", json("")) == "LPS";
   volume.info.type = type_from(trailer.at("type"));
   ZfpLayout layout;
   layout.counts_casts =
@@ -139,6 +140,7 @@ std::string zfp_trailer_text(const CompressedVolume &volume, const ZfpLayout &la
     const glm::dvec3 axis = info.direction[column];
     add_to_list<json>(trailer, "direction", {axis.x, axis.y, axis.z});
   }
+  if (info.is_anatomical) trailer["space"] = "LPS";
   trailer["type"] = to_string(info.type);
   if (std::isfinite(volume.value_range[0])) trailer["value_range"] = volume.value_range;
   if (volume.max_voxel_error) trailer["max_error"] = *volume.max_voxel_error;

@@ -56,7 +56,9 @@ std::vector<Camera> make_cameras(const std::string &path, const VolumeInfo &info
                 options.cameras, file->spacing->x, file->spacing->y, file->spacing->z, path,
                 info.spacing.x, info.spacing.y, info.spacing.z);
   }
-  return file ? file->cameras : orbit_cameras(info, views.count);
+  if (file) return file->cameras;
+  return orbit_cameras(info, views.count, up_of(options.view),
+                       double(views.size.width) / views.size.height);
 }
 
 VolumeAndViews load_volume_and_views(const std::string &path, const VolumeOptions &volume,

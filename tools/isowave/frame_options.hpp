@@ -10,6 +10,7 @@
 #include "core/view/camera.hpp"
 #include "core/view/frame.hpp"
 #include "core/zfp/zfp_stream.hpp"
+#include "tools/isowave/view_options.hpp"
 #include "tools/isowave/volume_options.hpp"
 
 namespace isowave::core::tools {
@@ -23,6 +24,7 @@ struct FrameOptions {
   std::uint32_t samples = 1;  ///< ImageSize::samples
   std::uint32_t orbit = 0;    ///< views; 0: one, or the camera file's
   std::string cameras;        ///< camera file
+  ViewOptions view;           ///< render's alone
 };
 
 /// Adds --isovalue, --voxel-error, --size, --orbit, --cameras and add_compression_options().

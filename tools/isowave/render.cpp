@@ -21,6 +21,8 @@
 #include "core/bricks/brick_volume.hpp"
 #include "core/bricks/ranks.hpp"
 #include "core/bricks/team_renderer.hpp"
+#include "core/frame/surface_camera.hpp"
+#include "core/io/atomic_file.hpp"
 #include "core/io/file_name.hpp"
 #include "core/io/movie.hpp"
 #include "core/io/npy.hpp"
@@ -60,6 +62,11 @@ struct FrameOfMany {
   }
   isowave::FrameRequest request() const;
   void write_outputs(const isowave::FrameRequest &request, const Frame &frame) const;
+  /// The camera of the picture, as a camera file.
+  std::string camera_text() const {
+    const ImageSize &size = drawing.views.size;
+    return camera_file_text({drawing.cameras[view]}, size.width, size.height);
+  }
   Image8 annotated(const isowave::FrameRequest &request, const Frame &frame) const;
   void report_error(const Frame &frame, ordered_json &entry) const;
   void write_refined(isowave::FrameRequest request) const;
@@ -133,7 +140,7 @@ void FrameOfMany::write_outputs(const isowave::FrameRequest &request, const Fram
     }
     if (!options.image.empty() || drawing.movie) {
       const Image8 image = annotated(request, frame);
-      if (!options.image.empty()) write_png(image, path(options.image));
+      if (!options.image.empty()) write_png(image, path(options.image), camera_text());
       if (drawing.movie) drawing.movie->write(image);
     }
     if (!options.depth.empty())
@@ -165,7 +172,8 @@ void FrameOfMany::write_refined(isowave::FrameRequest request) const {
   request.want_depth = false;
   const Frame refined = drawing.renderer->render(request);
   together(drawing.team, [&] {
-    if (drawing.team.rank() == 0) write_png(annotated(request, refined), path(options.refined));
+    if (drawing.team.rank() == 0)
+      write_png(annotated(request, refined), path(options.refined), camera_text());
   });
   fmt::print("  refined: {} rays hit, {:.1f} ms more\n", with_commas(refined.statistics.hits),
              refined.statistics.total_ms);
@@ -322,6 +330,15 @@ ordered_json document_of_team(const RenderArgs &options, const Drawing &drawing,
           {"ranks", ranks}};
 }
 
+/// --save-camera
+void save_cameras(const RenderArgs &options, const Drawing &drawing) {
+  if (options.frame.view.save.empty()) return;
+  const ImageSize &size = drawing.views.size;
+  AtomicFile file(options.frame.view.save);
+  file.write(camera_file_text(drawing.cameras, size.width, size.height));
+  file.commit();
+}
+
 /// If no isovalue was given: takes a suggested one, also for the names of files.
 void suggest_isovalue(RenderArgs &options, const Drawing &drawing, Outputs &outputs) {
   if (!options.frame.isovalues.empty()) return;
@@ -337,6 +354,29 @@ void make_renderers(RenderArgs &options, Drawing &drawing) {
   const bool is_on_cpu = drawing.is_team() && drawing.device->info().type == ocl::DeviceType::kCpu;
   in_turns(drawing.team, !is_on_cpu || MpiJob::local_rank() == 0,
            [&] { make_renderer(options, drawing); });
+}
+
+/// Makes the cameras of drawing.renderer, unless they stand on the circle of --orbit, or a file has
+/// them.
+void choose_cameras(const RenderArgs &options, Drawing &drawing) {
+  const ViewOptions &view = options.frame.view;
+  if (options.frame.orbit == 0 && !drawing.views.file) {
+    const Viewpoint from = viewpoint_of(view, drawing.views.count);
+    const ImageSize size = drawing.views.size;
+    Renderer &renderer = drawing.renderer->core();
+    const Camera first =
+        view.fit == "box" ? surface_camera(drawing.info(), {}, size, from)
+        : has_labels(options.surfaces)
+            ? renderer.label_camera(labels_of(options.surfaces), size, from)
+            : renderer.camera(drawn_isovalues(drawing.volume(), all_isovalues(options)), size,
+                              from);
+    drawing.cameras =
+        turntable(first, drawing.views.count, orientation_of(drawing.info(), from.up).up);
+  }
+  for (Camera &camera : drawing.cameras) {
+    if (options.parallel) camera = in_parallel(camera);
+    camera = zoomed(camera, view.zoom);
+  }
 }
 
 /// Opens the device, if one draws, loads the volume and makes the renderer.
@@ -371,19 +411,7 @@ void set_up(const CLI::App &command, RenderArgs &options, Drawing &drawing) {
   });
   make_renderers(options, drawing);
   if (compiling) compiling->finish();
-  const bool fits_surface = options.frame.orbit == 0 && !drawing.views.file;
-  if (fits_surface) {
-    const std::uint32_t num_views = drawing.views.count;
-    Renderer &renderer = drawing.renderer->core();
-    const Camera first =
-        has_labels(options.surfaces)
-            ? renderer.label_camera(labels_of(options.surfaces), drawing.views.size, num_views)
-            : renderer.camera(drawn_isovalues(drawing.volume(), all_isovalues(options)),
-                              drawing.views.size, num_views);
-    drawing.cameras = turntable(first, num_views);
-  }
-  if (options.parallel)
-    std::ranges::transform(drawing.cameras, drawing.cameras.begin(), in_parallel);
+  choose_cameras(options, drawing);
 }
 
 /// What is drawn, as options say it.
@@ -417,7 +445,7 @@ void read_scene_of_file(const CLI::App &command, RenderArgs &options, Drawing &d
   options.light.shadow_rays = request.appearance.shadow_rays;
   options.light.bounce_rays = request.appearance.bounce_rays;
   options.annotations = scene.annotations;
-  if (scene.camera && options.frame.orbit == 0 && !drawing.views.file)
+  if (scene.camera && options.frame.orbit == 0 && !drawing.views.file && !chooses_view(command))
     drawing.views.file = CameraFile{{}, {}, {}, {}, {core_camera(*scene.camera)}};
 }
 
@@ -484,6 +512,7 @@ void run_render(const CLI::App &command, RenderArgs options) {
   }
   together(drawing.team, [&] {
     if (drawing.team.rank() == 0 && !options.stats.empty()) write_json(document, options.stats);
+    if (drawing.team.rank() == 0) save_cameras(options, drawing);
     if (!drawing.movie) return;
     drawing.movie->commit();
     fmt::print("wrote {}: {} pictures\n", options.movie, drawing.movie->num_frames());

@@ -214,6 +214,7 @@ void count_turntable(const RenderArgs &options, Views &views) {
 }
 
 void check_options(const CLI::App &command, const RenderArgs &options, const Team &team) {
+  check_view_options(command, options.frame.view, !options.frame.cameras.empty());
   check_surface_options(command, options, team);
   check_slice_options(command, options);
   check_movie_options(command, options);
@@ -279,6 +280,7 @@ Outputs check_outputs(const RenderArgs &options, std::size_t num_views) {
     outputs.read_volume(options.color_map.field);
   outputs.write("--stats", options.stats);
   outputs.write("--save-scene", options.scene.save);
+  outputs.write("--save-camera", options.frame.view.save);
   outputs.write("--movie", options.movie);
   // A suggested isovalue, which is not known yet, changes the names of files, not their folders.
   std::vector<double> isovalues = options.frame.isovalues;
@@ -322,11 +324,13 @@ namespace {
 void group_render_options(CLI::App &command) {
   group_options(
       command, "Options of every day",
-      {"--help",     "--isovalue", "--surface",  "--labels",      "--scene",      "--output",
-       "--size",     "--samples",  "--orbit",    "--turntable",   "--steps",      "--cameras",
-       "--parallel", "--color",    "--color-by", "--color-map",   "--background", "--transparent",
-       "--light",    "--shadow",   "--bounce",   "--light-angle", "--normals",    "--ambient",
-       "--annotate", "--units",    "--device"});
+      {"--help",       "--isovalue",    "--surface",  "--labels", "--scene",    "--output",
+       "--size",       "--samples",     "--steps",    "--color",  "--color-by", "--color-map",
+       "--background", "--transparent", "--light",    "--shadow", "--bounce",   "--light-angle",
+       "--normals",    "--ambient",     "--annotate", "--units",  "--device"});
+  group_options(command, "Views",
+                {"--view", "--up", "--zoom", "--fit", "--orbit", "--turntable", "--cameras",
+                 "--save-camera", "--parallel"});
   group_options(command, "Clipping and slices",
                 {"--clip", "--clip-box", "--no-caps", "--slice", "--slice-opacity", "--slice-map",
                  "--slice-range"});
@@ -375,9 +379,8 @@ void add_picture_options(CLI::App &command, RenderArgs &options) {
   command
       .add_option(
           "--turntable", options.turntable,
-          "number of views once around the surfaces, about +y, from so far that they are in "
-          "all pictures; a camera of --cameras or --scene is turned about its own up axis "
-          "[--orbit looks at the whole volume]")
+          "number of views once around what --fit says, about --up, from so far that it is in all "
+          "pictures; a camera of --cameras or --scene is turned about its own up axis")
       ->check(CLI::Range(1u, kMostViews));
   command.add_option("--output,-o", options.image,
                      "PNG of the picture; NAME_isoV_viewK.png, with --surface NAME_viewK.png, if "
@@ -403,6 +406,7 @@ void add_render_options(CLI::App &command, RenderArgs &options) {
       ->description(
           "isovalue; repeat it for more pictures, of each isovalue from all views [the first that "
           "`isowave info` suggests]");
+  add_view_options(command, options.frame.view);
   add_surface_option(command, options.surface_texts);
   add_labels_option(command, options.label_texts);
   add_scene_options(command, options.scene);
@@ -471,7 +475,8 @@ void add_render_options(CLI::App &command, RenderArgs &options) {
       "use the scalar C++ reference instead of a device or the host; options that say how a device "
       "draws then have no effect");
   command.get_option("--orbit")->description(
-      "number of views around the whole volume [one view, which the surfaces fill]");
+      "number of views around the whole volume, about --up, 20 degrees above its middle [one "
+      "view]");
   group_render_options(command);
 }
 

@@ -11,16 +11,18 @@ namespace {
 using Picture =
     nb::ndarray<std::uint8_t, nb::ro, nb::shape<-1, -1, -1>, nb::c_contig, nb::device::cpu>;
 
-isowave::Frame frame_of(const Picture &picture) {
+/// camera: None, or as fields of isowave::Camera
+isowave::Frame frame_of(const Picture &picture, const std::optional<nb::dict> &camera) {
   isowave::Frame frame;
+  if (camera) isowave::for_each_camera_field(frame.camera.emplace(), reader_of(*camera));
   frame.size = {static_cast<std::uint32_t>(picture.shape(1)),
                 static_cast<std::uint32_t>(picture.shape(0)), 1};
   frame.picture = isowave::Array<std::uint8_t>(std::span(picture.data(), picture.size()));
   return frame;
 }
 
-nb::bytes encode_png(const Picture &picture) {
-  const isowave::Frame frame = frame_of(picture);
+nb::bytes encode_png(const Picture &picture, const std::optional<nb::dict> &camera) {
+  const isowave::Frame frame = frame_of(picture, camera);
   std::vector<std::uint8_t> bytes;
   {
     const WithoutGil no_gil;
@@ -29,8 +31,9 @@ nb::bytes encode_png(const Picture &picture) {
   return nb::bytes(bytes.data(), bytes.size());
 }
 
-void save_png(const Picture &picture, const std::filesystem::path &path) {
-  const isowave::Frame frame = frame_of(picture);
+void save_png(const Picture &picture, const std::filesystem::path &path,
+              const std::optional<nb::dict> &camera) {
+  const isowave::Frame frame = frame_of(picture, camera);
   const WithoutGil no_gil;
   isowave::save_png(frame, path);
 }
@@ -45,8 +48,8 @@ NB_MODULE(_core, m) {
       nb::cpp_function([] { PythonsEnd::instance().come(); }));
   m.def("is_ending", [] { return PythonsEnd::instance().is_near(); });
   m.attr("__version__") = std::string(isowave::version());
-  m.def("encode_png", &encode_png, "picture"_a);
-  m.def("save_png", &save_png, "picture"_a, "path"_a);
+  m.def("encode_png", &encode_png, "picture"_a, "camera"_a.none());
+  m.def("save_png", &save_png, "picture"_a, "path"_a, "camera"_a.none());
 
   add_volumes(m);
   add_renderers(m);

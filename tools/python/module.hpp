@@ -69,6 +69,13 @@ inline auto reader_of(const nb::dict &options) {
   };
 }
 
+/// Arguments of isowave.Camera.
+inline nb::tuple camera_tuple(const isowave::Camera &camera) {
+  const auto vector = [](const Vector3 &v) { return nb::make_tuple(v[0], v[1], v[2]); };
+  return nb::make_tuple(vector(camera.eye), vector(camera.at), vector(camera.up),
+                        camera.fovy_degrees, camera.parallel_height);
+}
+
 /// Lets the library's work in other threads come to an end before Python does: frames after the
 /// pass at hand, compression after the layer, renderers after the kernel. A thread that was at it
 /// never returns to Python.

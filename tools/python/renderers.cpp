@@ -26,12 +26,6 @@ nb::dict device_dict(const isowave::DeviceInfo &info) {
   return result;
 }
 
-nb::tuple camera_tuple(const isowave::Camera &camera) {
-  const auto vector = [](const Vector3 &v) { return nb::make_tuple(v[0], v[1], v[2]); };
-  return nb::make_tuple(vector(camera.eye), vector(camera.at), vector(camera.up),
-                        camera.fovy_degrees);
-}
-
 /// [height][width][3], or [4] if it is transparent; [0][0][3] at ranks that get no picture.
 nb::object picture_array(isowave::Array<std::uint8_t> &&pixels, const isowave::ImageSize &size) {
   if (pixels.empty()) return to_numpy<std::uint8_t>(std::move(pixels), {0, 0, 3});
@@ -384,14 +378,6 @@ class PyRenderer {
     return surfaces;
   }
 
-  nb::tuple camera(const std::vector<double> &values, std::uint32_t width, std::uint32_t height,
-                   bool labels) {
-    const std::vector<isowave::Surface> surfaces = surfaces_of(values, labels);
-    return camera_tuple(without_gil([&](Callbacks &) {
-      return renderer_->camera(surfaces, isowave::ImageSize{width, height, 1});
-    }));
-  }
-
   std::vector<nb::tuple> turntable(const std::vector<double> &values, std::uint32_t num_views,
                                    std::uint32_t width, std::uint32_t height, bool labels) {
     const std::vector<isowave::Surface> surfaces = surfaces_of(values, labels);
@@ -469,7 +455,6 @@ void add_renderers(nb::module_ &m) {
   nb::class_<PyRenderer>(m, "Renderer")
       .def("render", &PyRenderer::render, "request"_a, "on_pass"_a.none(), "interrupts"_a)
       .def("cast_rays", &PyRenderer::cast_rays, "rays"_a, "isovalue"_a, "normals"_a)
-      .def("camera", &PyRenderer::camera, "values"_a, "width"_a, "height"_a, "labels"_a = false)
       .def("turntable", &PyRenderer::turntable, "values"_a, "num_views"_a, "width"_a, "height"_a,
            "labels"_a = false)
       .def(
@@ -486,7 +471,9 @@ void add_renderers(nb::module_ &m) {
       .def_prop_ro("dims", [](const PyRenderer &r) { return r.renderer().grid().dims; })
       .def_prop_ro("spacing", [](const PyRenderer &r) { return r.renderer().grid().spacing; })
       .def_prop_ro("origin", [](const PyRenderer &r) { return r.renderer().grid().origin; })
-      .def_prop_ro("direction", [](const PyRenderer &r) { return r.renderer().grid().direction; });
+      .def_prop_ro("direction", [](const PyRenderer &r) { return r.renderer().grid().direction; })
+      .def_prop_ro("is_anatomical",
+                   [](const PyRenderer &r) { return r.renderer().grid().is_anatomical; });
   m.def(
       "draws_on_host",
       [](const std::string &selector) {

@@ -25,13 +25,32 @@ std::string type_name(isowave::VoxelType type) {
   return kTypeNames.at(static_cast<std::size_t>(type));
 }
 
-/// The type of an array's voxels, and their places: dims, spacing, origin, direction as
-/// isowave::Grid.
-using PyGrid = std::tuple<std::string, Index3, Vector3, Vector3, std::array<Vector3, 3>>;
+/// The type of an array's voxels, and their places: dims, spacing, origin, direction, is_anatomical
+/// as isowave::Grid.
+using PyGrid = std::tuple<std::string, Index3, Vector3, Vector3, std::array<Vector3, 3>, bool>;
 
 isowave::Grid grid_of(const PyGrid &grid) {
-  const auto &[type, dims, spacing, origin, direction] = grid;
-  return {dims, spacing, origin, direction};
+  const auto &[type, dims, spacing, origin, direction, is_anatomical] = grid;
+  return {dims, spacing, origin, direction, is_anatomical};
+}
+
+/// Views of the box of a grid.
+std::vector<nb::tuple> box_turntable(const PyGrid &grid, std::uint32_t num_views, int side,
+                                     const std::optional<Vector3> &up, double zoom,
+                                     const std::array<std::uint32_t, 2> &size) {
+  std::vector<nb::tuple> result;
+  const isowave::Viewpoint from{static_cast<isowave::Side>(side), up, zoom};
+  for (const isowave::Camera &camera :
+       isowave::box_turntable(grid_of(grid), num_views, from, {size[0], size[1]}))
+    result.push_back(camera_tuple(camera));
+  return result;
+}
+
+nb::tuple fitted(const nb::dict &camera, const PyGrid &grid,
+                 const std::array<std::uint32_t, 2> &size) {
+  isowave::Camera from;
+  isowave::for_each_camera_field(from, reader_of(camera));
+  return camera_tuple(isowave::fitted(from, grid_of(grid), {size[0], size[1]}));
 }
 
 /// Reports to `progress`, if there is one, and looks for signals.
@@ -217,6 +236,8 @@ void add_volumes(nb::module_ &m) {
       .def_prop_ro("spacing", [](const PyVolume &v) { return v.volume->grid().spacing; })
       .def_prop_ro("origin", [](const PyVolume &v) { return v.volume->grid().origin; })
       .def_prop_ro("direction", [](const PyVolume &v) { return v.volume->grid().direction; })
+      .def_prop_ro("is_anatomical",
+                   [](const PyVolume &v) { return v.volume->grid().is_anatomical; })
       .def_prop_ro("source_type",
                    [](const PyVolume &v) { return type_name(v.volume->source_type()); })
       .def_prop_ro("value_range", [](const PyVolume &v) { return v.volume->value_range(); })
@@ -251,6 +272,9 @@ void add_volumes(nb::module_ &m) {
           "path"_a, nb::call_guard<WithoutGil>())
       .def("extract", &extract, "device"_a, "isovalue"_a, "level"_a, "normals"_a,
            "exact_vertices"_a, "closed"_a, "largest"_a, "memory_budget"_a, "progress"_a.none());
+  m.def("box_turntable", &box_turntable, "grid"_a, "num_views"_a, "side"_a, "up"_a.none(), "zoom"_a,
+        "size"_a);
+  m.def("fitted", &fitted, "camera"_a, "grid"_a, "size"_a);
   m.def("save_mesh", &save_mesh, "vertices"_a, "faces"_a, "normals"_a.none(), "path"_a);
   m.def("compress", &compress, "read"_a, "voxels"_a, "options"_a, "keep"_a, "path"_a.none(),
         "progress"_a.none());

@@ -426,6 +426,7 @@ struct Frame {
   /// FrameStatistics::errors_are_stated.
   Array<float> bounds{};
 
+  std::optional<Camera> camera{};  ///< of the request; save_png() writes it into the file, too
   FrameStatistics statistics{};
   std::optional<DetailChoice> detail{};  ///< if max_surface_error or max_image_error was given
 };

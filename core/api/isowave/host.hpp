@@ -16,4 +16,5 @@
 #include "isowave/renderer.hpp"
 #include "isowave/series.hpp"
 #include "isowave/version.hpp"
+#include "isowave/views.hpp"
 #include "isowave/volume.hpp"

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "isowave/frame.hpp"
+#include "isowave/views.hpp"
 #include "isowave/volume.hpp"
 
 namespace isowave {
@@ -75,18 +76,22 @@ class Renderer {
   ///         the direction is too short; the renderer is a team's
   Frame cast_rays(std::span<const Ray> rays, double isovalue, Normals normals = Normals::kSmooth);
 
-  /// A view from the front right and above in which the isosurface fills a picture of that size
-  /// (none: of the largest size). If there is no surface, the volume fills the picture.
-  Camera camera(double isovalue, std::optional<ImageSize> size = {});
+  /// A view in which the volume's box fills a picture of that size (none: of the largest size):
+  /// box_camera(). It is the same for all steps of a series, and all compressions of a volume.
+  Camera camera(std::optional<ImageSize> size = {}, const Viewpoint &from = {});
+  /// A view that the isosurface fills: the blocks of voxels that it may be in. If there is no
+  /// surface, the volume fills the picture.
+  Camera camera(double isovalue, std::optional<ImageSize> size = {}, const Viewpoint &from = {});
   /// The same for all surfaces of a frame together.
-  Camera camera(const std::vector<Surface> &surfaces, std::optional<ImageSize> size = {});
-  /// Views once around the surfaces, about the world axis +y, from so far that the surfaces are in
-  /// all pictures. The first view is from where camera() looks, and each is turned on by 360 /
-  /// num_views degrees.
+  Camera camera(const std::vector<Surface> &surfaces, std::optional<ImageSize> size = {},
+                const Viewpoint &from = {});
+  /// Views once around the surfaces, or without surfaces around the volume's box, about
+  /// Viewpoint::up, from so far that they are in all pictures. The first view is that of camera(),
+  /// but for the distance, and each is turned on by 360 / num_views degrees.
   ///
   /// Throws  Error: num_views is not 1 to 100,000
   std::vector<Camera> turntable(const std::vector<Surface> &surfaces, std::uint32_t num_views,
-                                std::optional<ImageSize> size = {});
+                                std::optional<ImageSize> size = {}, const Viewpoint &from = {});
 
   /// Whether the renderer was made for such requests.
   bool can_draw(const FrameRequest &request) const;

@@ -41,7 +41,7 @@ struct Scene {
   /// File of the second volume, for Appearance::color_by_field; empty: not said. `volume`: the
   /// drawn volume itself (./volume is a file of that name).
   std::filesystem::path field{};
-  std::optional<Camera> camera{};  ///< none: a view that the surfaces fill, Renderer::camera()
+  std::optional<Camera> camera{};  ///< none: a view that the volume's box fills
   /// 1 to 8. One opaque surface is drawn as FrameRequest::isovalue, several as
   /// FrameRequest::surfaces.
   std::vector<Surface> surfaces{};

@@ -39,6 +39,9 @@ struct Grid {
   Vector3 origin{0, 0, 0};              ///< world position of voxel (0,0,0)
   /// Unit world direction of the index axes x, y, z.
   std::array<Vector3, 3> direction{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+  /// World space is a patient's, LPS: +x left, +y posterior, +z superior. Files say so: NIfTI, NRRD
+  /// in space LPS, RAS or LAS, MetaImage with an AnatomicalOrientation. Only views depend on it.
+  bool is_anatomical = false;
 };
 
 /// Voxels of a grid: begin, begin + step, ... below end, along x, y, z.

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from isowave import _core
-from isowave._camera import Camera, view_count
+from isowave._camera import Camera, turntable_of, view_count
 from isowave._checked import Isovalue, number, size_of
 from isowave._compress import compression_options
 from isowave._image import Image
@@ -190,12 +190,17 @@ class BrickRenderer(Placed[_core.Renderer]):
         """As Renderer.turntable()."""
 
         def ask() -> tuple[Request, int, tuple[int, int]]:
-            value = given_isovalue(isovalue_or_surfaces(isovalue, surfaces))
+            if isovalue is None and not surfaces:
+                value = 0.0
+            else:
+                value = given_isovalue(isovalue_or_surfaces(isovalue, surfaces))
             wanted = self._checked(Request(value, surfaces=surfaces))
             count = view_count(num_views)
             return wanted, count, self.size if size is None else size_of(size)
 
         request, count, (width, height) = self._processes.together(ask)
+        if isovalue is None and not surfaces:
+            return turntable_of(self, count, "corner", (width, height), None, 1.0)
         cameras = self._core.turntable(request.values, count, width, height, request.has_labels)
         return [Camera(*camera) for camera in cameras]
 
@@ -263,9 +268,7 @@ class BrickRenderer(Placed[_core.Renderer]):
         if len(set(self._processes.all_gather(b"" if camera is None else b"given"))) > 1:
             raise _core.Error("some processes give a camera, and others none: ask alike")
         if camera is None:
-            wanted = None if request.surfaces else request.isovalue
-            view = self.camera(wanted, request.size, surfaces=request.surfaces)
-            request = replace(request, camera=view)
+            request = replace(request, camera=self.camera(size=request.size))
         if request.on_pass is not None:
             request = replace(request, on_pass=self._for_all(request.on_pass))
         frame = draw(self._core, request, interrupts=False)

@@ -7,6 +7,7 @@ import os
 import sys
 import warnings
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -120,6 +121,7 @@ def compress(
     spacing: Sequence[float] | None = None,
     origin: Sequence[float] | None = None,
     direction: npt.ArrayLike | None = None,
+    anatomical: bool | None = None,
     levels: int = 1,
     map_nan: float | None = None,
     no_data: float | None = None,
@@ -153,6 +155,9 @@ def compress(
         array says (xarray, SimpleITK...), else 1 and 0.
     direction
         3 x 3; column a is the unit world direction (x, y, z) of index axis a, in the order x, y, z.
+    anatomical
+        Whether world space is a patient's, LPS: views then have superior up, and anterior in front.
+        None: what the array says (SimpleITK, itk, nibabel), else False.
     levels
         Number of levels of detail, with the volume itself; 0: all that it can have.
     map_nan
@@ -181,6 +186,8 @@ def compress(
     source = as_source(
         array, spacing=spacing, origin=origin, direction=direction, fill_value=fill_value
     )
+    if anatomical is not None:
+        source = replace(source, is_anatomical=flag("anatomical", anatomical))
     if no_data is None:
         no_data = source.no_data
     options = compression_options(
@@ -202,7 +209,7 @@ def compressed(
     nz, ny, nx = source.shape
     columns: list[_core.Vector] = [column.tolist() for column in source.direction.T]
     spacing, origin = reversed_axes(source.spacing), reversed_axes(source.origin)
-    voxels = (str(source.dtype), (nx, ny, nz), spacing, origin, columns)
+    voxels = (str(source.dtype), (nx, ny, nz), spacing, origin, columns, source.is_anatomical)
     if file is None and is_plain(array):
         return _core.compress_array(array, voxels, options, progress)
     keep = not isinstance(array, (np.ndarray, memoryview))  # these can be read again at no cost

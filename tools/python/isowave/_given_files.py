@@ -84,8 +84,9 @@ def write_nrrd(source: ArraySource, path: str) -> None:
     stored = np.dtype("float64") if kind in ("int64", "uint64") else source.dtype
     steps = (source.direction * source.spacing[::-1]).T.tolist()
     vectors = [f"({','.join(map(repr, step))})" for step in [*steps, source.origin[::-1]]]
+    space = "space: left-posterior-superior" if source.is_anatomical else "space dimension: 3"
     header = (
-        f"NRRD0004\ntype: {_NRRD_TYPES.get(kind, kind)}\ndimension: 3\nspace dimension: 3\n"
+        f"NRRD0004\ntype: {_NRRD_TYPES.get(kind, kind)}\ndimension: 3\n{space}\n"
         f"sizes: {nx} {ny} {nz}\nspace directions: {' '.join(vectors[:3])}\n"
         f"space origin: {vectors[3]}\nendian: little\nencoding: raw\n\n"
     )

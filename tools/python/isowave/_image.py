@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from isowave import _core
 from isowave._annotate import Annotations, annotated
+from isowave._camera import camera_for_core
 from isowave._checked import flag
 from isowave._request import Request, rgb_of
 from isowave._surface import Surface
@@ -157,7 +158,7 @@ class Image:
         return np.asarray(self.rgba, dtype)
 
     def _repr_png_(self) -> bytes:
-        return _core.encode_png(self._drawn())
+        return _core.encode_png(self._drawn(), camera_for_core(self.camera))
 
     def save(self, path: str | os.PathLike[str], *, alpha: bool = False) -> None:
         """Writes a .png file, whole or not at all.
@@ -165,7 +166,8 @@ class Image:
         alpha: writes `rgba`; pixels without surface are transparent. Otherwise the picture is
         written as it was drawn.
         """
-        _core.save_png(self.rgba if flag("alpha", alpha) else self._drawn(), os.fsdecode(path))
+        picture = self.rgba if flag("alpha", alpha) else self._drawn()
+        _core.save_png(picture, os.fsdecode(path), camera_for_core(self.camera))
 
     def __repr__(self) -> str:
         shown = ""

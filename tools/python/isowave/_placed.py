@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from isowave._core import Voxels
 
 
 class _Grid(Protocol):
@@ -23,6 +26,10 @@ class _Grid(Protocol):
 
     @property
     def direction(self) -> list[list[float]]:
+        ...
+
+    @property
+    def is_anatomical(self) -> bool:
         ...
 
 
@@ -58,6 +65,24 @@ class Placed(Generic[Core]):
         """3 x 3; column a: unit world direction (x, y, z) of index axis a, in the order x, y, z."""
         columns: npt.NDArray[np.float64] = np.asarray(self._core.direction, dtype=np.float64)
         return np.ascontiguousarray(columns.T)
+
+    @property
+    def _grid(self) -> Voxels:
+        """For the compiled part; the type of voxels has no effect on views."""
+        core = self._core
+        x, y, z = core.dims
+        columns: Any = core.direction
+        return "uint8", (x, y, z), core.spacing, core.origin, columns, core.is_anatomical
+
+    @property
+    def anatomical(self) -> bool:
+        """Whether world space is a patient's, LPS: +x left, +y posterior, +z superior."""
+        return self._core.is_anatomical
+
+    @property
+    def up(self) -> Vector:
+        """Direction (x, y, z) that is up: +z, superior, if the volume is anatomical, else +y."""
+        return (0.0, 0.0, 1.0) if self.anatomical else (0.0, 1.0, 0.0)
 
     @property
     def box(self) -> tuple[Vector, Vector]:

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from isowave import _core
-from isowave._camera import Camera, view_count
+from isowave._camera import Camera, turntable_of, view_count
 from isowave._checked import Isovalue, flag, refuse, size_of, whole
 from isowave._clip import ClipPlane
 from isowave._color_map import ColorMap
@@ -234,11 +234,9 @@ class Renderer:
         *,
         surfaces: Sequence[Surface] = (),
     ) -> Camera:
-        """A view from the front right and above in which the surfaces fill the picture."""
-        value = self.volume._isovalue(isovalue_or_surfaces(isovalue, surfaces))
-        request = Request(value, surfaces=surfaces)
-        self._check_labels(request)
-        return self._camera(request, self.size if size is None else size_of(size))
+        """A view from the front right and above; the surfaces, or without any the volume's box,
+        fill the picture."""
+        return self.turntable(1, isovalue, size, surfaces=surfaces)[0]
 
     def turntable(
         self,
@@ -248,24 +246,19 @@ class Renderer:
         *,
         surfaces: Sequence[Surface] = (),
     ) -> list[Camera]:
-        """Views once around the surfaces, as Volume.turntable()."""
+        """Views once around the surfaces, or the volume's box, as Volume.turntable()."""
+        width, height = self.size if size is None else size_of(size)
+        if isovalue is None and not surfaces:
+            return turntable_of(self.volume, num_views, "corner", (width, height), None, 1.0)
         value = self.volume._isovalue(isovalue_or_surfaces(isovalue, surfaces))
         request = Request(value, surfaces=surfaces)
-        self._check_labels(request)
-        width, height = self.size if size is None else size_of(size)
+        if request.has_labels and not self._can["labels"]:
+            raise _core.Error("labels needs a renderer that was made with labels=True")
         self._check_turn()
         cameras = self._core.turntable(
             request.values, view_count(num_views), width, height, request.has_labels
         )
         return [Camera(*camera) for camera in cameras]
-
-    def _check_labels(self, request: Request) -> None:
-        if request.has_labels and not self._can["labels"]:
-            raise _core.Error("labels needs a renderer that was made with labels=True")
-
-    def _camera(self, request: Request, size: tuple[int, int]) -> Camera:
-        self._check_turn()
-        return Camera(*self._core.camera(request.values, *size, request.has_labels))
 
     def _check_turn(self) -> None:
         """Raises Error in the loop over passes(), whose frame keeps the renderer until it ends."""
@@ -313,7 +306,7 @@ class Renderer:
         isovalue
             Value of the field on the surface. "auto": the first of Volume.suggested_isovalues().
         camera
-            None: the surface fills the picture.
+            None: that of camera() without a surface, Camera.of(volume).
         size
             Width and height [pixels]; None: the renderer's largest.
         samples
@@ -417,7 +410,7 @@ class Renderer:
 
     def _completed(self, request: Request) -> Request:
         size = request.size or self.size
-        camera = request.camera or self._camera(request, size)
+        camera = request.camera or Camera.of(self.volume, size=size)
         return replace(request, size=size, camera=camera)
 
     def cast_rays(

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from isowave import _core
-from isowave._camera import Camera, vector
+from isowave._camera import Camera, camera_for_core, vector
 from isowave._checked import (
     Isovalue,
     flag,
@@ -298,17 +298,6 @@ def series_of(series: Any) -> tuple[Camera, ...]:
     if not isinstance(series, Sequence):
         raise refuse("series", series, "a list of cameras")
     return tuple(camera_of(camera) for camera in series)
-
-
-def camera_for_core(camera: Camera) -> dict[str, Any]:
-    """The camera as fields of isowave::Camera."""
-    return {
-        "eye": camera.eye,
-        "at": camera.at,
-        "up": camera.up,
-        "fovy_degrees": camera.fovy,
-        "parallel_height": camera.parallel_height,
-    }
 
 
 def lights_of(lights: Any) -> dict[str, float]:

@@ -9,13 +9,13 @@ from typing import Any, Protocol
 
 from isowave import _core
 from isowave._annotate import Annotations, annotations_for_core
-from isowave._camera import Camera, vector
+from isowave._camera import Camera, camera_for_core, vector
 from isowave._checked import Isovalue, number
 from isowave._clip import ClipPlane, clip_of
 from isowave._color_map import ColorMap, color_map_for_core, color_map_of
 from isowave._image import Image
 from isowave._levels import Voxels
-from isowave._request import camera_for_core, camera_of, lights_of, optional_color
+from isowave._request import camera_of, lights_of, optional_color
 from isowave._slice import Slice, slice_map_for_core, slice_map_of, slices_of
 from isowave._surface import Color, Surface, surface_for_core, surfaces_of
 
@@ -125,7 +125,7 @@ class Scene:
         return replace(self, planes=(*self.planes, *more), caps=caps)
 
     def seen_from(self, camera: Camera | None) -> Scene:
-        """The scene with another view; None: one that the surfaces fill."""
+        """The scene with another view; None: one that the volume's box fills."""
         return replace(self, view=camera)
 
     def look(self, **fields: Any) -> Scene:

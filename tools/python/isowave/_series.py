@@ -87,15 +87,13 @@ class Series(Sequence[Volume]):
     ) -> Iterator[Image]:
         """Draws each step, as Volume.render() does: a picture at a time, when it is asked for.
 
-        Without a camera, all pictures have the one that Volume.camera() has for the first step.
+        Without a camera, all pictures have the same: the view that the volumes' box fills.
         isovalue="auto" is the first step's suggestion.
         """
         isovalue_or_surfaces(isovalue, surfaces)
         for volume in self:
             if isovalue is not None:
                 isovalue = volume._isovalue(isovalue)
-            if camera is None:
-                camera = volume.camera(isovalue, size=size, surfaces=surfaces, device=device)
             yield volume.render(
                 isovalue, size=size, camera=camera, surfaces=surfaces, device=device, **more
             )

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from isowave import _core, viewer
 from isowave._checked import Isovalue, flag, function, reversed_axes, whole
-from isowave._camera import Camera
+from isowave._camera import Camera, turntable_of
 from isowave._image import Image
 from isowave._levels import Voxels
 from isowave._mesh import Mesh
@@ -107,7 +107,14 @@ class Volume(Voxels):
         surfaces: Sequence[Surface] = (),
         device: str | int | None = None,
     ) -> Camera:
-        """A view from the front right and above in which the surfaces fill the picture."""
+        """A view from the front right and above that the surfaces fill.
+
+        Without an isovalue and surfaces: the view that render() takes by default, in which the
+        volume's box fills the picture. It is the same for all steps of a series. Camera.of() has
+        other sides.
+        """
+        if isovalue is None and not surfaces:
+            return Camera.of(self, size=size)
         with self._lock:
             renderer = self._renderer_for({"device": device, **labels_wanted(surfaces)})
             return renderer.camera(isovalue, size, surfaces=surfaces)
@@ -121,11 +128,14 @@ class Volume(Voxels):
         surfaces: Sequence[Surface] = (),
         device: str | int | None = None,
     ) -> list[Camera]:
-        """Views once around the surfaces, as those of `isowave render --turntable`.
+        """Views once around the surfaces, or without any around the volume's box.
 
-        The views turn about the world's y axis, from so far that the surfaces are in all pictures
-        of that size. The first view is from where camera() looks.
+        They are those of `isowave render --turntable`, with `--fit surface` and without. They turn
+        about `up`, from so far that all pictures of that size have the whole. The first view is
+        from where camera() looks.
         """
+        if isovalue is None and not surfaces:
+            return turntable_of(self, num_views, "corner", size, None, 1.0)
         with self._lock:
             renderer = self._renderer_for({"device": device, **labels_wanted(surfaces)})
             return renderer.turntable(num_views, isovalue, size, surfaces=surfaces)
@@ -160,7 +170,7 @@ class Volume(Voxels):
         size
             Width and height of the picture [pixels].
         camera
-            None: the surface fills the picture.
+            None: the volume's box fills the picture, Camera.of(volume).
         device, memory_budget
             As Renderer's.
         surfaces

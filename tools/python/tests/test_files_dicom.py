@@ -84,6 +84,7 @@ def test_layers_are_sorted_by_position_and_rescaled(tmp_path):
     volume = isowave.open(tmp_path / "ct")
     assert np.array_equal(volume[...], 2 * VOXELS.astype("float32") - 1000)
     assert volume.spacing == pytest.approx(SPACING)
+    assert volume.anatomical and volume.up == (0, 0, 1)
 
 
 def test_gdcm_reads_the_same(tmp_path):

@@ -6,6 +6,7 @@ import pathlib
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 
 import file_writers as write
 import numpy as np
@@ -199,8 +200,10 @@ def test_nrrd_has_the_same_bits_and_place(tmp_path, dtype):
     direction = np.array([[0, 0, -1.0], [0.6, 0.8, 0], [0.8, -0.6, 0]])
     voxels = VOXELS.astype(dtype)
     source = as_source(voxels, spacing=(0.1, 0.3, 1e-3), origin=ORIGIN, direction=direction)
+    source = replace(source, is_anatomical=dtype == "uint8")
     write_nrrd(source, str(tmp_path / "a.nrrd"))
     volume = isowave.open(tmp_path / "a.nrrd")
+    assert volume.anatomical == (dtype == "uint8")
     assert volume.source_dtype == ("float64" if dtype == "int64" else dtype)
     assert np.array_equal(volume[...], voxels.astype("float32"))
     np.testing.assert_allclose(volume.direction, direction, atol=1e-15)

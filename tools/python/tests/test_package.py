@@ -222,7 +222,7 @@ def test_ambient_rays_darken_what_sees_little_of_the_sky():
 
 def test_device_and_host_draw_the_same_bits(volume):
     said = volume.verify(6, size=SIZE)
-    assert said["equal"] and said["hits"] > 100
+    assert said["equal"] and said["hits"] > 50
 
 
 def test_the_host_draws_all_that_a_device_draws():

@@ -140,12 +140,13 @@ def test_what_is_no_series_is_refused(source, options, error, text):
         isowave.open_series(source, **options)
 
 
-def test_all_pictures_have_the_camera_of_the_first_step(folder):
+def test_all_pictures_have_one_camera(folder):
     series = isowave.open_series(folder / "s_*.nrrd")[::5]
     images = list(series.render(60, size=SIZE, device="host"))
-    camera = series[0].camera(60, size=SIZE, device="host")
+    camera = isowave.Camera.of(series[0], size=SIZE)
     assert [image.camera for image in images] == [camera] * 3
-    assert series[2].camera(60, size=SIZE, device="host") != camera, "else this proves nothing"
+    fits = [series[t].camera(60, size=SIZE, device="host") for t in (0, 2)]
+    assert fits[0] != fits[1] != camera, "else this proves nothing"
     for image, t in zip(images, (0, 5, 10), strict=True):
         alone = series[t // 5].render(60, size=SIZE, camera=camera, device="host")
         assert np.array_equal(image.rgb, alone.rgb)
@@ -174,7 +175,7 @@ def test_turntables_are_the_programs(program, tmp_path):
     cameras = volume.turntable(3, 40, size=SIZE, device="host")
     assert len(cameras) == 3
     program("render", FUEL, "-i", 40, "--size", "64x48", "--turntable", 3, "--device", "host",
-            "-o", tmp_path / "p.png")  # fmt: skip
+            "--fit", "surface", "-o", tmp_path / "p.png")  # fmt: skip
     for k, camera in enumerate(cameras):
         volume.render(40, size=SIZE, camera=camera, device="host").save(tmp_path / "q.png")
         assert (tmp_path / "q.png").read_bytes() == (tmp_path / f"p_iso40_view{k}.png").read_bytes()
@@ -185,8 +186,9 @@ def test_turntables_are_the_programs(program, tmp_path):
     for wrong, error in ((0, ValueError), (100_001, ValueError), ("3", TypeError)):
         with pytest.raises(error, match="give"):
             volume.turntable(wrong, 40)
-    with pytest.raises(TypeError, match="isovalue, or surfaces"):
-        volume.turntable(3)
+    around = volume.turntable(3, size=SIZE)
+    assert around == renderer.turntable(3) and around[0] != cameras[0]
+    assert volume.turntable(1, size=SIZE) == [volume.camera(size=SIZE)]
 
 
 def frames_of(path):

@@ -119,7 +119,7 @@ def test_the_camera_sees_all_surfaces(ball: isowave.Volume) -> None:
     renderer = ball.renderer(size=SIZE, device="host")
     assert renderer.camera(surfaces=BOTH) == renderer.camera(0) != renderer.camera(5)
     assert ball.camera(surfaces=BOTH, size=SIZE, device="host") == renderer.camera(0)
-    assert renderer.render(surfaces=BOTH).camera == renderer.camera(0)
+    assert renderer.render(surfaces=BOTH).camera == renderer.camera()
 
 
 def test_transparent_pictures_and_others_with_alpha(ball: isowave.Volume) -> None:

@@ -92,7 +92,7 @@ def test_the_lossless_picture_has_the_renderers_bits(
     )
     np.testing.assert_array_equal(shown, expected.rgb)
     assert np.unique(shown.reshape(-1, 3), axis=0).shape[0] > 50  # there is a surface
-    camera = renderer.camera(8.5)
+    camera = renderer.camera()
     assert head["camera"]["eye"] == list(camera.eye)
 
 

@@ -351,13 +351,13 @@ def test_a_time_budget_needs_no_first_picture() -> None:
     )
 
 
-def test_the_surface_fills_the_picture_where_no_camera_is_given() -> None:
+def test_the_volume_fills_the_picture_where_no_camera_is_given() -> None:
     clock, volume = Clock(), FakeVolume()
     scene = make_scene(volume, clock)
     eye = Eye(scene)
     eye.wish(80.0, size=(64, 48))
     run(scene)
-    home = volume.renderer(device=None, size=(64, 48), samples=1).camera(80.0, (64, 48))
+    home = volume.renderer(device=None, size=(64, 48), samples=1).camera(size=(64, 48))
     assert volume.frames[0].request.camera == home == volume.frames[1].request.camera
     assert eye.of_type("picture")[0]["camera"]["eye"] == list(home.eye)
     eye.ack()

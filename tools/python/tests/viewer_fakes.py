@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from isowave._camera import Camera
 from isowave._placed import Vector
 from isowave._request import Request
-from isowave._surface import Surface
 
 SIDE = 64  # voxels along each axis, spacing 1
 VALUES = 255.0  # at the centre; 0 at the middle of a face
@@ -99,6 +98,7 @@ class FakeVolume:
     renderers: list[dict[str, Any]] = field(default_factory=list)
     shape: tuple[int, int, int] = (SIDE, SIDE, SIDE)
     spacing: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    anatomical: bool = False
     box: tuple[Vector, Vector] = ((0.0, 0.0, 0.0), (SIDE - 1.0, SIDE - 1.0, SIDE - 1.0))
     source_dtype: np.dtype[Any] = field(default_factory=lambda: np.dtype(np.uint8))
     value_range: tuple[float, float] = (0.0, VALUES)
@@ -145,17 +145,9 @@ class FakeRenderer:
         width, height = options["size"]
         self.memory_bytes = 48 * width * height * options["samples"] ** 2
 
-    def camera(
-        self,
-        isovalue: float | None,
-        size: tuple[int, int],
-        *,
-        surfaces: Sequence[Surface] = (),
-    ) -> Camera:
-        if isovalue is None:
-            isovalue = min(surface.values[0] for surface in surfaces)
+    def camera(self, *, size: tuple[int, int]) -> Camera:
         centre = (SIDE - 1) / 2
-        away = 2.2 * max(2.0, self._radius(isovalue)) * max(1.0, size[1] / size[0])
+        away = 2.2 * max(2.0, self._radius(VALUES / 3)) * max(1.0, size[1] / size[0])
         return Camera((centre, centre, centre + away), (centre, centre, centre))
 
     def draw(self, request: Request) -> FakeImage:

@@ -41,6 +41,7 @@ class Placement:
     spacing: Vector = (1.0, 1.0, 1.0)
     origin: Vector = (0.0, 0.0, 0.0)
     direction: Matrix = IDENTITY
+    is_anatomical: bool = False  #: whether the world is a patient's, LPS
 
 
 def finite_number(value: Any, what: str, name: str) -> float:

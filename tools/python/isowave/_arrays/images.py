@@ -25,6 +25,7 @@ def simpleitk_image(image: Any, has_spacing: bool) -> Found:
         vector(image.GetSpacing(), what, "spacing"),
         vector(image.GetOrigin(), what, "origin"),
         matrix((rows[0:3], rows[3:6], rows[6:9]), what),
+        is_anatomical=True,  # ITK's world is LPS
     )
     # The view does not own its memory: the function holds the image.
     return _of_view(array, what, placement, owner=image)
@@ -41,6 +42,7 @@ def itk_image(image: Any, has_spacing: bool) -> Found:
         vector(image.GetSpacing(), what, "spacing"),
         vector(image.GetOrigin(), what, "origin"),
         matrix(np.asarray(image.GetDirection()), what),
+        is_anatomical=True,
     )
     first = vector(region.GetIndex(), what, "the region's index")
     return _of_view(array, what, placement, first, owner=image)

@@ -90,6 +90,7 @@ def _to_lps(placement: Placement, unit: float) -> Placement:
             (-anterior[0] + 0.0, -anterior[1] + 0.0, -anterior[2] + 0.0),
             (superior[0] + 0.0, superior[1] + 0.0, superior[2] + 0.0),
         ),
+        is_anatomical=True,
     )
 
 

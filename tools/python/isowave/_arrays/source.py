@@ -41,6 +41,7 @@ class ArraySource:
     chunk_layers  layers along z of the store's largest chunks, 1 if there are no chunks; slabs of a
                   multiple of it hold whole chunks
     no_data       value of voxels without data, as the array's metadata says; None: it says none
+    is_anatomical whether the world is a patient's, LPS
     """
 
     shape: tuple[int, int, int]
@@ -50,6 +51,7 @@ class ArraySource:
     direction: NDArray[np.float64]
     chunk_layers: int
     no_data: float | None
+    is_anatomical: bool
     _what: str = field(repr=False)
     _reader: LayerReader = field(repr=False)
 
@@ -189,6 +191,7 @@ def source_of(
         direction=rows,
         chunk_layers=most_layers(found.row_edges, nz),
         no_data=no_data_of(found.no_data),
+        is_anatomical=placement.is_anatomical,
         _what=what,
         _reader=LayerReader(found.fetch, found.shape, stored, dtype, found.row_edges, fill, what),
     )

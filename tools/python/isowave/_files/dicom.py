@@ -11,7 +11,7 @@ import importlib
 import math
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -284,4 +284,5 @@ def _placement(layers: Sequence[_Layer], has_spacing: bool) -> Placement:
         start = (float(positions[0][0]), float(positions[0][1]), float(positions[0][2]))
     matrix = np.column_stack([np.array(first.along[:3]) * x, np.array(first.along[3:]) * y, step])
     rows: Any = tuple(tuple(map(float, row)) for row in matrix)
-    return placement_of_affine(rows, start, "images")
+    placement = placement_of_affine(rows, start, "images")
+    return replace(placement, is_anatomical=first.position is not None)

@@ -7,6 +7,7 @@ from typing import Final
 
 PARTS: Final = (
     "state.js",
+    "moves.js",
     "clip.js",
     "surfaces.js",
     "quality.js",

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from isowave._camera import Camera
 from isowave._placed import Vector
 from isowave._request import Request
-from isowave._surface import Surface
 
 
 class ImageLike(Protocol):
@@ -65,13 +64,7 @@ class RendererLike(Protocol):
     def memory_bytes(self) -> int:
         ...
 
-    def camera(
-        self,
-        isovalue: float | None,
-        size: tuple[int, int],
-        *,
-        surfaces: Sequence[Surface] = (),
-    ) -> Camera:
+    def camera(self, *, size: tuple[int, int]) -> Camera:
         ...
 
     def draw(self, request: Request) -> ImageLike:
@@ -87,6 +80,10 @@ class VolumeLike(Protocol):
 
     @property
     def spacing(self) -> tuple[float, float, float]:
+        ...
+
+    @property
+    def anatomical(self) -> bool:
         ...
 
     @property

@@ -62,7 +62,9 @@ ${TIME_ROW}
     <dl class="facts"></dl>
     <details><summary>Keys and gestures</summary><p id="keys">Drag, one finger or arrow keys: turn.
       Right drag, shift and drag, two fingers or shift and arrows: move. Wheel, pinch, + and −:
-      zoom. 0 or double click: reset. The keys work while the picture has the focus.</p></details>
+      zoom. 1, 3, 7: front, right, top;
+      9: the opposite side. 0 or double click: reset. The keys work while the picture has the
+      focus.</p></details>
   </aside>
   <p class="said" role="status"></p>
 </div>`;

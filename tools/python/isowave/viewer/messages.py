@@ -42,6 +42,7 @@ def welcome(
         "shape": [int(n) for n in volume.shape],
         "spacing": [float(s) for s in volume.spacing],
         "box": [list(corner) for corner in volume.box],
+        "anatomical": bool(volume.anatomical),
         "dtype": str(volume.source_dtype),
         "range": list(value_range),
         "bits_per_voxel": float(volume.bits_per_voxel),

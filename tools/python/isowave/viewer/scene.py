@@ -337,7 +337,7 @@ class Scene:
         self, renderer: RendererLike, client: Client, wish: Wish, stage: Stage, extent: Extent
     ) -> None:
         began = self._clock()
-        camera = client.camera or home(renderer, wish)
+        camera = client.camera or renderer.camera(size=wish.size)
         with self._changed:
             if client.wish is not wish:
                 return
@@ -566,13 +566,6 @@ class Scene:
                 self._broadcast(message)
             else:
                 self._range = float(edges[0]), float(edges[-1])
-
-
-def home(renderer: RendererLike, wish: Wish) -> Camera:
-    """A view that the wish's surfaces fill."""
-    surfaces = wish.request.surfaces
-    isovalue = None if surfaces else wish.request.isovalue
-    return renderer.camera(isovalue, wish.size, surfaces=surfaces)
 
 
 def chosen_voxel_pixels(image: ImageLike, frame: Frame) -> float:

@@ -1,4 +1,4 @@
-// state.js -- what a view shows, as a URL keeps it: the camera and how it moves, isovalue, colours.
+// state.js -- what a view shows, as a URL keeps it: the camera, isovalue, colours.
 // The first part of an ES module (front_end.py).
 
 /** @typedef {[number, number, number]} Vec */
@@ -34,39 +34,6 @@ const cross = (a, b) => [
 const length = (a) => Math.hypot(...a);
 const unit = (a) => scale(a, 1 / length(a));
 const clamp = (x, low, high) => Math.min(high, Math.max(low, x));
-
-/** v turned about a unit axis [radians] (Rodrigues). */
-function turn(v, axis, angle) {
-  const c = Math.cos(angle);
-  const along = scale(axis, dot(axis, v) * (1 - c));
-  return add(add(scale(v, c), scale(cross(axis, v), Math.sin(angle))), along);
-}
-
-/** The eye goes around `at`: yaw to the left of up, pitch towards up [radians]. */
-export function orbit(camera, yaw, pitch) {
-  const up = unit(camera.up);
-  const away = turn(sub(camera.eye, camera.at), up, -yaw);
-  const polar = Math.acos(clamp(dot(unit(away), up), -1, 1));
-  const next = clamp(polar - pitch, 0.02, Math.PI - 0.02);
-  const eye = add(camera.at, turn(away, unit(cross(up, away)), next - polar));
-  return { ...camera, eye };
-}
-
-/** Eye and at move so that the surface follows by dx, dy [picture heights; y down]. */
-export function pan(camera, dx, dy) {
-  const forward = sub(camera.at, camera.eye);
-  const height = 2 * length(forward) * Math.tan((camera.fovy_deg * Math.PI) / 360);
-  const right = unit(cross(forward, camera.up));
-  const up = cross(right, unit(forward));
-  const move = add(scale(right, -dx * height), scale(up, dy * height));
-  return { ...camera, eye: add(camera.eye, move), at: add(camera.at, move) };
-}
-
-/** The eye's distance from `at` is multiplied by a factor. */
-export function zoom(camera, factor) {
-  const away = scale(sub(camera.eye, camera.at), factor);
-  return length(away) > 0 ? { ...camera, eye: add(camera.at, away) } : camera;
-}
 
 /** Throws  Error that says what is wrong with a camera */
 function checkCamera(camera) {

@@ -3,13 +3,13 @@
 //
 // What the front end says (protocol.py checks it): hello, wish, ack, budget, scene. What it hears:
 //
-//   welcome    title, shape [z,y,x], spacing, box [[x,y,z], [x,y,z]] in world space, dtype,
-//              range [low, high], bits_per_voxel, max_error of voxels, isovalue, scene: fields of
-//              the scene to show at first, or null; annotations: those to show at first, as in
-//              wishes, or null: the scene's; field: name, range of the second volume
-//              ("volume": the same one), and labels: whether it may have some; or null; steps:
-//              names of a series' steps, or null. The facts are those of its first step, and all
-//              steps have one box
+//   welcome    title, shape [z,y,x], spacing, box [[x,y,z], [x,y,z]] in world space,
+//              anatomical: whether that is a patient's, LPS; dtype, range [low, high],
+//              bits_per_voxel, max_error of voxels, isovalue, scene: fields of the scene to show at
+//              first, or null; annotations: those to show at first, as in wishes, or null: the
+//              scene's; field: name, range of the second volume ("volume": the same one), and
+//              labels: whether it may have some; or null; steps: names of a series' steps, or null.
+//              The facts are those of its first step, and all steps have one box
 //   status     state: starting, ready, failed; device ("host": none), notice (what it computes
 //              otherwise than the host, or ""), device_memory (null on the host), memory_bytes,
 //              memory_budget, nbytes of the compressed volume
@@ -43,9 +43,6 @@ const VERSION = 11;
 const MIN_WAIT_MS = 15; // between two wishes
 const MAX_IN_WAIT_MS = 120; // for a picture of the last wish, before the next one is sent
 const MAX_PIXEL_RATIO = 2;
-const ORBIT_STEP = Math.PI / 36; // of an arrow key
-const PAN_STEP = 0.05; // of the picture's height
-const ZOOM_STEP = 1.15;
 const DARK = "(prefers-color-scheme: dark)";
 
 const isFresher = (a, b) => a.wish > b.wish || (a.wish === b.wish && a.frame > b.frame);
@@ -75,6 +72,7 @@ class View {
       background_top: null, shadow: null, bounce: 0, slices: [], slice_map: GRAY, labels: [],
       step: 0, annotations: NO_ANNOTATIONS };
     if (home.hash) Object.assign(this.state, readHash(location.hash, this.state));
+    this.sides = sidesOf(false);
     this.isNew = !(home.hash && location.hash.length > 1); // shows the server's scene first
     this.surfaces = new SurfaceList(this);
     this.quality = new QualityRows(this);
@@ -119,6 +117,7 @@ class View {
 
   welcome(head) {
     this.volume = head;
+    this.sides = sidesOf(head.anatomical);
     const [z, y, x] = head.shape;
     this.find("h1").textContent = head.title || "Volume";
     this.find(".volume").textContent =
@@ -210,7 +209,7 @@ class View {
     this.answered = true;
     this.failed = false;
     this.clearNote("passing", "drawing");
-    if (!this.state.camera && !this.resetDue) this.state.camera = head.camera;
+    if (!this.state.camera && !this.resetDue) this.state.camera = this.homeCamera = head.camera;
     const rest = head.stage === "whole" || head.stage === "lossless";
     this.progress(rest ? 100 : head.percent ?? 50);
     this.time.came(rest);
@@ -330,6 +329,17 @@ class View {
     }
   }
 
+  /** A window that was made narrower than high shows as much of the width as before. */
+  keepInView() {
+    const { width, height } = this.picture.getBoundingClientRect();
+    if (!(width >= 1 && height >= 1)) return; // hidden
+    const { camera } = this.state;
+    const narrow = Math.min(1, width / height);
+    if (camera && camera === this.homeCamera) this.state.camera = null; // is fitted anew
+    else if (camera && this.narrow) this.state.camera = zoom(camera, this.narrow / narrow);
+    this.narrow = narrow;
+  }
+
   backgroundShown() {
     return this.state.background ?? (this.home.isDark() ? "#14171a" : "#ffffff");
   }
@@ -408,6 +418,7 @@ class View {
     }
     const observer = new ResizeObserver(() => {
       this.drawHistogram();
+      this.keepInView();
       this.push();
     });
     observer.observe(this.picture);
@@ -458,7 +469,7 @@ class View {
     } else if (now.buttons & 2 || now.buttons & 4 || now.shiftKey) {
       this.move((c) => pan(c, dx, dy));
     } else {
-      this.move((c) => orbit(c, dx * Math.PI, dy * Math.PI));
+      this.move((c) => orbit(c, dx * Math.PI, dy * Math.PI, this.sides.top));
     }
   }
 
@@ -472,20 +483,10 @@ class View {
 
   key(event) {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
-    const arrows = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
-    const [x, y] = arrows[event.key] ?? [0, 0];
-    if (arrows[event.key]) {
-      this.move((c) => (event.shiftKey ? pan(c, x * PAN_STEP, y * PAN_STEP)
-        : orbit(c, x * ORBIT_STEP, y * ORBIT_STEP)));
-    } else if (event.key === "+" || event.key === "=") {
-      this.move((c) => zoom(c, 1 / ZOOM_STEP));
-    } else if (event.key === "-" || event.key === "_") {
-      this.move((c) => zoom(c, ZOOM_STEP));
-    } else if (event.key === "0") {
-      this.change({ camera: null });
-    } else {
-      return;
-    }
+    const move = moveOfKey(event, this.sides);
+    if (move) this.move(move);
+    else if (event.key === "0") this.change({ camera: null });
+    else return;
     event.preventDefault();
   }
 
