@@ -114,7 +114,7 @@ TEST(ApiSurfaces, TheHostDrawsTheTwinsFrames) {
 
 /// The error of the first crossing.
 TEST(ApiSurfaces, HaveBoundsOfTheirError) {
-  const auto volume = sphere({.rate = 20});
+  const auto volume = sphere({.rate = 20, .measure_error = true});
   Renderer twin = make_twin(volume), host = make_host_renderer(volume);
   FrameRequest request = spheres(twin);
   request.want_bounds = true;
@@ -124,7 +124,7 @@ TEST(ApiSurfaces, HaveBoundsOfTheirError) {
   EXPECT_EQ(frame.bounds.to_vector(), host.render(request).bounds.to_vector());
   EXPECT_GT(std::ranges::count_if(frame.bounds, [](float b) { return b > 0 && b < 1; }), 100);
   request = spheres(twin);
-  request.max_surface_error = 0.5;
+  request.max_surface_error = 2;
   for (const Evidence by : {Evidence::kProof, Evidence::kSample}) {
     request.by = by;
     EXPECT_TRUE(host.can_draw(request));
