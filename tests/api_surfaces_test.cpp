@@ -130,7 +130,7 @@ TEST(ApiSurfaces, HaveBoundsOfTheirError) {
     EXPECT_TRUE(host.can_draw(request));
     const Frame chosen = host.render(request);
     EXPECT_TRUE(chosen.detail.value().reachable);
-    EXPECT_GT(chosen.detail->voxel_error, 0);
+    EXPECT_EQ(chosen.detail->voxel_pixels, 0);
     EXPECT_EQ(chosen.statistics.layers, 2u);
   }
 }
