@@ -75,7 +75,7 @@ void forget_layer(benchmark::State &state) {
   auto &in = input<LayersInput>(state.range(0));
   measure(
       state, {in.num_rays(), in.num_rays() * sizeof(HitRecord)}, [] {},
-      [&] { in.layers.forget_hits(in.rays); });
+      [&] { in.layers.forget(in.rays, in.rays.hits); });
 }
 
 void blend_layer(benchmark::State &state) {

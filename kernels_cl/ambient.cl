@@ -86,14 +86,19 @@ kernel void ambient_block(const FrameParams frame_params, global const ClipParam
 /// Moves the rays of a round to where they enter what is left of clipped surfaces: entering().
 ///
 /// frame_params, clip, first_level  as ambient
-/// In, Out  given [pixel]
+/// has_nearest  0 or 1: nearest are hits
+/// In, Out  given [pixel]; nearest [pixel]: bounce_nearest's, whose t go with the rays
 /// Launch   grid-stride over pixels
 kernel void ambient_enter(const FrameParams frame_params, global const ClipParams *clip,
-                          uint first_level, global GivenRay *given) {
+                          uint first_level, uint has_nearest, global GivenRay *given,
+                          global HitRecord *nearest) {
   const FrameParams *frame = &frame_params;
   const uint num_pixels = frame->view.width * frame->view.height;
   for (uint pixel = get_global_id(0); pixel < num_pixels; pixel += get_global_size(0)) {
-    if (is_given(given[pixel]))
-      given[pixel] = entering(clip, given[pixel], voxel_of(first_level, given[pixel]));
+    const GivenRay ray = given[pixel];
+    if (!is_given(ray)) continue;
+    const float begin = entry_of(clip, ray, voxel_of(first_level, ray));
+    given[pixel] = ray_from(ray, begin);
+    if (has_nearest) nearest[pixel].t = t_from(frame, nearest[pixel].t, begin);
   }
 }

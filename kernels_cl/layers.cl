@@ -62,7 +62,7 @@ kernel void layers_forget(const FrameParams frame_params, global HitRecord *laye
 ///
 /// blends   ISO_COUNTS_ALONE: counts the layer's hits. ISO_PREVIEWS: writes colors and counts.
 ///          ISO_BLENDS: all of Out and In, Out
-/// open_counts, num_ambient, num_shadow  of the layer's hits: as shade_pixel()
+/// open_counts, num_ambient, num_shadow, bounced, num_bounced  of the layer's hits: LightOfHits
 /// In       color_map [ISO_MAP_COLORS]; as layers_choose; layers [1]; values [height * width] of
 ///          hits with has_value_color()
 /// In, Out  hits [height * width] of the layer; passed [height * width]; if the layer is not the
@@ -73,10 +73,11 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void layers_b
     const FrameParams frame_params, const ShadeParams shade_params, global const uint *color_map,
     uint blends, uint is_first, global const LayerParams *layers, global const LayerCounts *counts,
     global const uint *rays, global const float *values, global const uchar *open_counts,
-    uint num_ambient, uint num_shadow, global HitRecord *hits, global HitRecord *first_hits,
-    global uchar *passed, global RayColor *colors, global LayerCounts *next_counts,
-    global uint *next_rays) {
+    uint num_ambient, uint num_shadow, global const float *bounced, uint num_bounced,
+    global HitRecord *hits, global HitRecord *first_hits, global uchar *passed,
+    global RayColor *colors, global LayerCounts *next_counts, global uint *next_rays) {
   const FrameParams *frame = &frame_params;
+  const LightOfHits light = {open_counts, num_ambient, num_shadow, bounced, num_bounced, 1};
   local uint sums[2 + ISO_MAX_SURFACES], counters[2];
   const PixelBox box = {0, 0, frame->view.width, frame->view.height};
   const uint item = get_local_id(0), num_rays = is_first ? num_tiled_pixels(box) : counts->rays;
@@ -97,10 +98,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void layers_b
       const int is_seen = !is_unseen(layers, hit, value);
       if (is_seen) atomic_inc(&sums[0]);
       if (blends != ISO_COUNTS_ALONE) {
-        const RayColor seen =
-            blend_hit(frame, &shade_params, color_map, layers, ray, hit, value,
-                      open_share(open_counts, ray, num_ambient),
-                      open_share(open_counts, frame_rays(frame) + ray, num_shadow), colors[ray]);
+        const RayColor seen = blend_hit(frame, &shade_params, color_map, layers, ray, hit, value,
+                                        light_of_hit(&light, frame_rays(frame), ray), colors[ray]);
         colors[ray] = seen;
         is_on = goes_on(seen);
         if (is_on) atomic_inc(&sums[2 + surface_of(hit)]);

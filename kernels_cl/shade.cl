@@ -15,7 +15,7 @@ kernel void shade(const FrameParams frame_params, const ShadeParams shade_params
                   uint with_alpha, global void *bytes) {
   global uint *image = (global uint *)bytes;
   const FrameParams *frame = &frame_params;
-  const LightOfHits light = {open_counts, num_ambient, num_shadow, bounced, num_bounced};
+  const LightOfHits light = {open_counts, num_ambient, num_shadow, bounced, num_bounced, 0};
   const uint columns = frame->view.width / samples, rows = frame->view.height / samples;
   const uint num_pixels = columns * rows,
              num_items = (num_pixels + ISO_PIXELS_OF_ITEM - 1) / ISO_PIXELS_OF_ITEM;

@@ -319,22 +319,15 @@ void smooth_gradients(std::span<const FrameParams> frames,
   });
 }
 
-namespace {
-
-void filter_bounced(const FrameParams &seen, const AmbientParams &params,
-                    std::span<const HitRecord> hits, std::vector<float> &bounced) {
-  std::vector<GivenRay> places(hits.size());
-  for (uint ray = 0; ray < hits.size(); ++ray)
-    places[ray] = normal_ray(&seen, &params, ray, hits[ray]);
+void filter_bounced(const FrameParams &seen, std::span<const GivenRay> places,
+                    std::vector<float> &bounced) {
   for (uint step = 0; step < ISO_BOUNCE_STEPS; ++step) {
     const std::vector<float> before = bounced;
-    for (uint ray = 0; ray < hits.size(); ++ray)
+    for (uint ray = 0; ray < places.size(); ++ray)
       bounced[ray] = filtered_light(seen.view.width, seen.view.height, places.data(), before.data(),
                                     ray, 1u << step);
   }
 }
-
-}  // namespace
 
 OpenCounts open_of(std::span<const FrameParams> frames, std::span<const VolumeInfo> levels,
                    std::span<const std::vector<float>> voxels, std::span<const HitRecord> hits,
@@ -385,7 +378,11 @@ OpenCounts open_of(std::span<const FrameParams> frames, std::span<const VolumeIn
       }
     }
   });
-  if (rays.bounces) filter_bounced(seen, params, hits, open.bounced);
+  if (!rays.bounces) return open;
+  std::vector<GivenRay> places(hits.size());
+  for (uint ray = 0; ray < hits.size(); ++ray)
+    places[ray] = normal_ray(&seen, &params, ray, hits[ray]);
+  filter_bounced(seen, places, open.bounced);
   return open;
 }
 

@@ -49,6 +49,13 @@ OpenCounts open_of(std::span<const FrameParams> frames, std::span<const VolumeIn
                    const LightRays &rays, Solver solver = kDefaultSolver, unsigned threads = 0,
                    const ClipParams &clip = {});
 
+/// Filters the sums of bounced light of a frame's rays.
+///
+/// places   [height * width] normal_ray()s
+/// bounced  [height * width]
+void filter_bounced(const FrameParams &seen, std::span<const GivenRay> places,
+                    std::vector<float> &bounced);
+
 /// One ray of the same: rays [level], which is the same ray in each level's index space, with its
 /// interval there.
 HitRecord trace_scalar_levels(std::span<const FrameParams> frames,

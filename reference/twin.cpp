@@ -7,6 +7,7 @@
 #include "core/base/parallel_for.hpp"
 #include "core/frame/ambient_rays.hpp"
 #include "core/frame/field_values.hpp"
+#include "kernels_cl/portable/bounce.h"
 #include "kernels_cl/portable/cell_intersect.h"
 #include "kernels_cl/portable/clip.h"
 #include "reference/scalar_renderer.hpp"
@@ -76,16 +77,27 @@ std::vector<HitRecord> crossings(const FrameParams &frame, const std::vector<flo
 /// A surface that light rays may meet.
 struct Caster {
   FrameParams frame;
-  ClipParams clip;
+  uint surface;
+  bool clipped;
 };
+
+/// A hit of a layer, and its light: the shares of rays, and the sums of what these bring.
+struct LitHit {
+  HitRecord hit = no_hit();
+  float value = no_value();
+  HitLight light{};
+};
+using LitLayers = std::vector<std::vector<LitHit>>;  ///< [layer][ray]
 
 /// The light rays of hits in layers.
 class LayerLight {
  public:
-  /// any_is_whole: any_is_whole() of the surfaces
+  /// clip          of the surfaces that it clips
+  /// any_is_whole  any_is_whole() of the surfaces
   LayerLight(const LightRays &rays, const VolumeInfo &info, const std::vector<float> &voxels,
-             bool any_is_whole)
+             const ClipParams &clip, bool any_is_whole)
       : rays_(rays),
+        clip_(clip),
         any_is_whole_(any_is_whole),
         params_(make_ambient_params(info, rays.num_ambient)),
         directions_(make_light_directions(rays)),
@@ -93,33 +105,85 @@ class LayerLight {
 
   void add(const Caster &caster) { casters_.push_back(caster); }
 
-  /// The rays of a hit that meet nothing: ambient rays, and shadow rays.
-  std::array<uchar, 2> count_open(const FrameParams &seen, uint pixel, const HitRecord &hit) const {
+  /// bounced: sums of all rays.
+  HitLight light_of(const FrameParams &seen, const LayerParams &layers, uint has_map, uint pixel,
+                    const HitRecord &hit) const {
     std::array<uchar, 2> counts{};
+    HitLight light{1, 1, nothing_bounced()};
+    if (is_of_slice(&layers, hit)) return light;
     const HitRecord placed = placed_hit(&seen, 0, hit);
+    const uint pattern = ambient_pattern(&seen, pixel);
     for (std::uint32_t k = 0; k < rays_.count(); ++k) {
-      const GivenRay given =
-          ambient_ray(&seen, &params_, placed, pixel, k,
-                      directions_[k * ISO_AMBIENT_PATTERNS + ambient_pattern(&seen, pixel)]);
-      if (!is_given(given) || meets_any(given)) continue;
-      uchar &count = counts[is_shadow_ray(&params_, k) ? 1 : 0];
-      count = static_cast<uchar>(count + 1);
+      const GivenRay given = ambient_ray(&seen, &params_, placed, pixel, k,
+                                         directions_[k * ISO_AMBIENT_PATTERNS + pattern]);
+      if (!is_given(given)) continue;
+      const HitRecord met = nearest_met(seen, given);
+      const bool is_shadow = is_shadow_ray(&params_, k);
+      if (!std::isfinite(met.t)) {
+        uchar &count = counts[is_shadow ? 1 : 0];
+        count = static_cast<uchar>(count + 1);
+      } else if (!is_shadow && rays_.bounces) {
+        const std::size_t row = rays_.num_ambient + light_row(rays_.num_shadow, k);
+        float cosine = 0;
+        const GivenRay to_light =
+            bounce_ray(&params_, given, placed_hit(&seen, 0, met),
+                       directions_[row * ISO_AMBIENT_PATTERNS + pattern], &cosine);
+        if (is_given(to_light) && !std::isfinite(nearest_met(seen, to_light).t))
+          light.bounced =
+              sum_with(light.bounced, cosine, sent_on(has_map, &layers, surface_of(met)));
+      }
     }
-    return counts;
+    light.open = open_share(counts.data(), 0, rays_.num_ambient);
+    light.lit = open_share(counts.data(), 1, rays_.num_shadow);
+    return light;
+  }
+
+  /// Makes the sums of all hits their shares, filtered layer by layer.
+  void filter(const FrameParams &seen, const LayerParams &params, LitLayers &layers) const {
+    for (std::vector<LitHit> &layer : layers) {
+      std::vector<GivenRay> places(layer.size());
+      for (uint ray = 0; ray < layer.size(); ++ray) {
+        const HitRecord &hit = layer[ray].hit;
+        places[ray] = normal_ray(&seen, &params_, ray, is_of_slice(&params, hit) ? no_hit() : hit);
+      }
+      for (float BouncedLight::*part :
+           {&BouncedLight::own, &BouncedLight::r, &BouncedLight::g, &BouncedLight::b}) {
+        std::vector<float> sums(layer.size());
+        for (std::size_t ray = 0; ray < layer.size(); ++ray)
+          sums[ray] = layer[ray].light.bounced.*part;
+        filter_bounced(seen, places, sums);
+        for (std::size_t ray = 0; ray < layer.size(); ++ray)
+          layer[ray].light.bounced.*part = sums[ray] / static_cast<float>(rays_.num_ambient);
+      }
+    }
   }
 
  private:
-  bool meets_any(const GivenRay &given) const {
-    return std::ranges::any_of(casters_, [&](const Caster &caster) {
-      const GivenRay ray = any_is_whole_ ? entering(&caster.clip, given, 1.0f) : given;
-      const HitRecord met =
-          trace_scalar(caster.frame, voxels_, kDefaultSolver, make_given_ray(ray));
-      return std::isfinite(met.t) &&
-             !is_clipped(&caster.clip, ray, 1.0f, met.t / caster.frame.view.t_scale);
-    });
+  /// The nearest of what a ray meets: surfaces that planes leave whole, then those that they clip.
+  HitRecord nearest_met(const FrameParams &seen, const GivenRay &given) const {
+    static constexpr ClipParams kWhole{};
+    HitRecord nearest = no_hit();
+    GivenRay ray = given;
+    for (const bool clipped : {false, true}) {
+      const ClipParams &clip = clipped ? clip_ : kWhole;
+      if (clipped && any_is_whole_) {
+        const float begin = entry_of(&clip, given, 1.0f);
+        ray = ray_from(given, begin);
+        nearest.t = t_from(&seen, nearest.t, begin);
+      }
+      for (const Caster &caster : casters_) {
+        if (caster.clipped != clipped) continue;
+        const HitRecord met =
+            trace_scalar(caster.frame, voxels_, kDefaultSolver, make_given_ray(ray));
+        if (met.t < nearest.t && !is_clipped(&clip, ray, 1.0f, met.t / seen.view.t_scale))
+          nearest = with_surface(met, caster.surface);
+      }
+    }
+    return nearest;
   }
 
   LightRays rays_;
+  ClipParams clip_;
   bool any_is_whole_;
   AmbientParams params_;
   std::vector<AmbientDirection> directions_;
@@ -175,10 +239,10 @@ LayeredFrame Twin::render_layers(const FrameRequest &request, const FieldTwin *f
       make_layer_shading(finest, request, has_field ? field->volume_range() : std::nullopt);
   const LayerParams colors =
       make_layer_params(surfaces, request.slices, finest, frames[0].view, request.camera);
-  LayerLight lights(light_rays, finest, voxels_[0], any_is_whole(surfaces));
+  LayerLight lights(light_rays, finest, voxels_[0], clip, any_is_whole(surfaces));
   for (std::size_t k = 0; k < order.size(); ++k) {
     const SurfaceStyle &surface = surfaces[order[k]];
-    if (surface.opacity == 1) lights.add({frames[k], surface.clipped ? clip : ClipParams{}});
+    if (surface.opacity == 1) lights.add({frames[k], order[k], surface.clipped});
   }
   const FieldReading of_slices{make_field_map({&finest, 1}, finest)};
   const uint num_slices = colors.slices.num_planes;
@@ -188,6 +252,7 @@ LayeredFrame Twin::render_layers(const FrameRequest &request, const FieldTwin *f
   result.first_hits.assign(num_rays, no_hit());
   result.colors.assign(num_rays, clear_ray());
   std::vector<uchar> cut(num_rays);
+  LitLayers lit(light_rays.bounces ? ISO_MAX_LAYERS : 0, std::vector<LitHit>(num_rays));
   parallel_for(num_rays, 0, [&](std::uint64_t i, std::uint32_t) {
     const auto pixel = static_cast<uint>(i);
     std::vector<std::vector<HitRecord>> left;  // [slice, then surface] in their order
@@ -224,13 +289,22 @@ LayeredFrame Twin::render_layers(const FrameRequest &request, const FieldTwin *f
       if (is_unseen(&colors, hit, value)) continue;
       result.layers[layer][i] = hit;
       if (!std::isfinite(result.first_hits[i].t)) result.first_hits[i] = hit;
-      std::array<uchar, 2> open{};
-      if (!is_of_slice(&colors, hit)) open = lights.count_open(frames[0], pixel, hit);
+      const HitLight light = lights.light_of(frames[0], colors, shading.params.has_map, pixel, hit);
+      if (light_rays.bounces) lit[layer][i] = {hit, value, light};
       color = blend_hit(frames.data(), &shading.params, shading.color_map.data(), &colors, pixel,
-                        hit, value, open_share(open.data(), 0, light_rays.num_ambient),
-                        open_share(open.data(), 1, light_rays.num_shadow), color);
+                        hit, value, light, color);
     }
   });
+  if (light_rays.bounces) {
+    lights.filter(frames[0], colors, lit);
+    result.colors.assign(num_rays, clear_ray());
+    for (const std::vector<LitHit> &layer : lit) {
+      for (uint ray = 0; ray < num_rays; ++ray)
+        result.colors[ray] =
+            blend_hit(frames.data(), &shading.params, shading.color_map.data(), &colors, ray,
+                      layer[ray].hit, layer[ray].value, layer[ray].light, result.colors[ray]);
+    }
+  }
   result.stats = stats_of(result.layers);
   result.stats.rays_cut = static_cast<std::uint64_t>(std::ranges::count(cut, 1));
   return result;

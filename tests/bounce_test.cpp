@@ -381,10 +381,8 @@ TEST(Bounce, BadRequestsAreRefused) {
   refuse([](FrameRequest &request) { request.light.towards_light.reset(); },
          "bounced light needs a light of the scene");
   refuse([](FrameRequest &request) { request.bounce_rays = 256; }, "256 bounce rays");
-  refuse([](FrameRequest &request) { request.surfaces = {{.isovalue = 0.1f}}; },
-         "drawn without bounced light");
-  refuse([](FrameRequest &request) { request.surfaces = {{.labels = {3}}}; },
-         "labels are drawn without bounced light");
+  refuse([](FrameRequest &request) { request.surfaces = {{.isovalue = 0.1f, .opacity = 0.5f}}; },
+         "end at surfaces of opacity 1, and there is none");
 }
 
 }  // namespace

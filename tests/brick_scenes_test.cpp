@@ -82,7 +82,7 @@ TEST_P(BrickScenesOnDevice, LightOfSeveralSurfaces) {
                        {0.2f, {0.2f, 0.4f, 0.9f}, 1},
                        {0.5f, {0.8f, 0.8f, 0.3f}, 1, false}};
   request_.clip = {{{{0.3, 1, 0.2}, 12}}, true};
-  const RendererOptions options{.max_surfaces = 3, .with_given_rays = true};
+  const RendererOptions options{.max_surfaces = 3, .with_bounce = true};
   const Shown unlit = expect_of_one(volume_.compressed, nullptr, options, request_);
   EXPECT_GT(unlit.layers.layers, 2u);
   request_.ambient_rays = 2;
@@ -92,6 +92,9 @@ TEST_P(BrickScenesOnDevice, LightOfSeveralSurfaces) {
   const Shown lit = expect_of_one(volume_.compressed, nullptr, options, request_);
   EXPECT_EQ(lit.layers.hits, unlit.layers.hits);
   EXPECT_NE(lit.picture.pixels, unlit.picture.pixels);
+  request_.bounce_rays = 2;
+  const Shown bounced = expect_of_one(volume_.compressed, nullptr, options, request_);
+  EXPECT_NE(lit.picture.pixels, bounced.picture.pixels);
 }
 
 /// Within bricks, in the planes of cuts and across each other.

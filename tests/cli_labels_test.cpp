@@ -149,7 +149,7 @@ TEST_F(CliLabels, WhatLabelsAreDrawnWithoutIsRefused) {
     refuse("--labels 3 " + std::string(option), "--labels draws surfaces of labels alone");
   for (const char *option :
        {"--voxel-pixels 1", "--voxel-error 1", "--max-surface-error 1", "--max-image-error 0.1",
-        "--time-budget 9", "--slice z", "--reference", "--rate 8", "--light 1,0,0 --bounce 4"})
+        "--time-budget 9", "--slice z", "--reference", "--rate 8"})
     refuse("--labels 3 " + std::string(option), "labels are drawn without it: leave it out");
   for (const char *option : {"--ambient 2", "--light 1,0,0 --shadow 1"})
     refuse("--labels 3,,0.5 " + std::string(option), "end at surfaces of opacity 1");

@@ -73,6 +73,13 @@ class CompileOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
         EXPECT_EQ(renderer.shade().pixels.size(), 3 * options.size.num_pixels());
       }
     }
+    if (options.max_surfaces != 0) {
+      FrameRequest request{.camera = cameras_[0], .surfaces = {{0.4f}}, .bounce_rays = 2};
+      request.surfaces.push_back({.isovalue = 0.1f, .opacity = 0.5f, .clipped = false});
+      request.light.towards_light = glm::dvec3(0, 0, 1);
+      renderer.render(request);
+      EXPECT_FALSE(renderer.shade().pixels.empty());
+    }
     if (options.with_kept_picture) {
       renderer.render({cameras_[0], 0.1f, halved(kSize, 1)});
       renderer.keep_picture();
@@ -101,6 +108,7 @@ TEST_P(CompileOnDevice, NothingIsLeftForFrames) {
   expect_all_compiled({.size = kSize, .stream = StreamPlace::kHost, .with_levels = true});
   expect_all_compiled({.size = kSize, .with_kept_picture = true});
   expect_all_compiled({.size = kSize, .with_levels = true, .with_bounce = true});
+  expect_all_compiled({.size = kSize, .max_surfaces = 2, .with_bounce = true});
   expect_all_compiled({.size = kSize, .pipeline = blocks_pipeline(), .with_given_rays = true});
 }
 

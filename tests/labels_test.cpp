@@ -206,13 +206,14 @@ TEST_P(LabelsOnDevice, LightRaysAreTheTwins) {
   const Scene scene({41, 38, 45});
   DeviceRenderer renderer(
       device_, scene.volume,
-      {.size = kSize, .max_surfaces = 1, .with_labels = true, .with_given_rays = true});
+      {.size = kSize, .max_surfaces = 1, .with_labels = true, .with_bounce = true});
   FrameRequest request = scene.request({group({300, 3})});
   request.light.towards_light = {0.3, -0.4, 1};
   request.ambient_rays = 3;
   request.shadow_rays = 2;
   expect_the_twins(renderer, scene, request);
   request.clip.planes = {scene.through_middle()};
+  request.bounce_rays = 3;
   expect_the_twins(renderer, scene, request);
   EXPECT_THAT([&] { renderer.cast_rays({}, 3, Normals::kCell); },
               ThrowsMessage<Error>(HasSubstr("draws labels alone")));

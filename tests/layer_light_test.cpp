@@ -1,10 +1,12 @@
-// Ambient and shadow rays of frames with several surfaces and slices: the hits of every layer have
-// them, and they end at opaque surfaces. Devices and the host must have the twin's pictures.
+// Ambient and shadow rays of frames with several surfaces and slices, and light that bounces: the
+// hits of every layer have them, and they end at opaque surfaces. Devices and the host must have
+// the twin's pictures.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <memory>
 #include <vector>
@@ -80,10 +82,13 @@ void expect_scenes_lit_as_the_twin(Renderer &renderer, const CompressedVolume &v
       SCOPED_TRACE(fmt::format("{} surfaces, {} planes", surfaces.size(), clip.planes.size()));
       FrameRequest request = lit_request(info, surfaces);
       request.clip = clip;
+      request.bounce_rays = clip.planes.empty() ? 0 : 4;
       expect_lit_as_the_twin(renderer, twin, request);
     }
   }
   FrameRequest request = lit_request(info, kScenes[1]);
+  request.bounce_rays = 2;
+  request.light.color_by = ColorByAxis{{1, 0.2, 0}, 0, 20, color_map("magma")};
   request.slices = {{{through(info, 0.4, {0.2, 1, 0.3}), 0.6f}}, -1, 1, color_map("viridis")};
   expect_lit_as_the_twin(renderer, twin, request);
 }
@@ -120,6 +125,53 @@ void expect_plain_light(Renderer &renderer, const VolumeInfo &info) {
   request.isovalue = kScenes[0][0].isovalue;
   renderer.render(request);
   EXPECT_EQ(renderer.shade(request.light).pixels, listed.pixels);
+}
+
+/// Light that bounces within the only surface of a list is that of a plain frame, up to rounding.
+void expect_plain_bounce(Renderer &renderer, const VolumeInfo &info) {
+  FrameRequest request = lit_request(info, kScenes[0]);
+  request.light.surface = kScenes[0][0].color;
+  request.bounce_rays = 5;
+  renderer.render(request);
+  const Image8 listed = renderer.shade(request.light);
+  request.surfaces.clear();
+  request.isovalue = kScenes[0][0].isovalue;
+  renderer.render(request);
+  const Image8 plain = renderer.shade(request.light);
+  for (std::size_t i = 0; i < plain.pixels.size(); ++i)
+    ASSERT_LE(std::abs(int{plain.pixels[i]} - int{listed.pixels[i]}), 1) << i;
+}
+
+/// What a red surface sends on is red. If it has the colours of a map, it has that of the surface
+/// that gets it.
+void expect_light_of_the_sender(Renderer &renderer, const VolumeInfo &info) {
+  FrameRequest request =
+      lit_request(info, {{0.2f, {0, 1, 0}, 0.5f, true, false}, {0.6f, {1, 0, 0}, 1}});
+  const auto pictures = [&](std::uint32_t bounce_rays) {
+    request.ambient_rays = 4;
+    request.bounce_rays = bounce_rays;
+    renderer.render(request);
+    return renderer.shade(request.light).pixels;
+  };
+  const auto changes = [&] {  // of red, green, blue
+    const std::vector<std::uint8_t> before = pictures(0), after = pictures(4);
+    std::array<int, 3> sums{};
+    for (std::size_t i = 0; i < before.size(); ++i) {
+      EXPECT_GE(after[i], before[i]);
+      sums[i % 3] += after[i] - before[i];
+    }
+    return sums;
+  };
+  // The green surface has no red to show it by, and the red one is lit by itself.
+  const std::array<int, 3> by_red = changes();
+  EXPECT_GT(by_red[0], 500);
+  EXPECT_EQ(by_red[1] + by_red[2], 0);
+  request.surfaces[0].color = {1, 1, 0};
+  EXPECT_GT(changes()[0], by_red[0] + 500) << "what is yellow is lit by red, too";
+  request.light.color_by = ColorByAxis{{1, 0, 0}, 0, 20, color_map("gray")};
+  const std::array<int, 3> by_map = changes();
+  EXPECT_GT(by_map[1], 500);
+  EXPECT_GT(by_map[2], 0) << "what is gray";
 }
 
 /// Two balls. The one at small x has no values above `most`.
@@ -166,6 +218,8 @@ TEST(LayerLightHost, PicturesAreTheTwins) {
   expect_scenes_lit_as_the_twin(renderer, volume);
   expect_light_behind_glass(renderer, volume.info);
   expect_plain_light(renderer, volume.info);
+  expect_plain_bounce(renderer, volume.info);
+  expect_light_of_the_sender(renderer, volume.info);
   expect_light_through_what_is_clipped([](const CompressedVolume &of) {
     return std::make_unique<HostRenderer>(of, HostRendererOptions{.largest = kSize});
   });
@@ -177,7 +231,7 @@ class LayerLightOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
  protected:
   DeviceRenderer renderer_of(const CompressedVolume &volume, RendererOptions options) {
     options.max_surfaces = 4;
-    options.with_given_rays = true;
+    options.with_bounce = true;
     return {device_, volume, options};
   }
 
@@ -193,7 +247,7 @@ TEST_P(LayerLightOnDevice, SmallFrame) {
   TwinRenderer twin(volume, kSmall);
   FrameRequest request = lit_request(volume.info, kScenes[2]);
   request.clip = {{through(volume.info, 0.5, {-0.3, -1, 0.2})}};
-  request.ambient_rays = request.shadow_rays = 1;
+  request.ambient_rays = request.shadow_rays = request.bounce_rays = 1;
   expect_lit_as_the_twin(renderer, twin, request);
 }
 
@@ -203,6 +257,8 @@ TEST_P(LayerLightOnDevice, PicturesAreTheTwins) {
   expect_scenes_lit_as_the_twin(renderer, volume);
   expect_light_behind_glass(renderer, volume.info);
   expect_plain_light(renderer, volume.info);
+  expect_plain_bounce(renderer, volume.info);
+  expect_light_of_the_sender(renderer, volume.info);
   expect_light_through_what_is_clipped([&](const CompressedVolume &of) {
     return std::make_unique<DeviceRenderer>(
         device_, of, RendererOptions{.size = kSize, .max_surfaces = 4, .with_given_rays = true});
@@ -214,6 +270,7 @@ TEST_P(LayerLightOnDevice, PassByPass) {
   const CompressedVolume volume = gyroid();
   DeviceRenderer renderer = renderer_of(volume, {.size = kSize, .cache_slots = 60});
   FrameRequest request = lit_request(volume.info, kScenes[2]);
+  request.bounce_rays = 2;
   TwinRenderer twin(volume, kSize);
   twin.render(request);
   std::uint32_t num_passes = 0;

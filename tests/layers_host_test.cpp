@@ -313,7 +313,7 @@ TEST(LayersOnTheHost, AllLoopsGiveTheSameBits) {
           std::vector<RayColor> colors(kSize.num_rays());
           LayerStats stats;
           const std::uint32_t num_hits =
-              blend(surfaces, by, all, next.data(), hits.data(), colors.data(), &stats);
+              blend(surfaces, by, all, next.data(), {hits.data(), colors.data(), &stats});
           EXPECT_EQ(num_hits, test::num_hits(hits));
           expect_same_hits(hits, expected.layers.front(), kSize.width);
           EXPECT_EQ(

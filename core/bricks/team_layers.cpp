@@ -205,15 +205,33 @@ class TeamRenderer::Layering {
       placed[ray].cell = 0;  // the finest level of detail
     }
     together(of_.team_, [&] { of_.renderer_.begin_ambient(request_, placed, {0, 1}); });
-    OpenCounts open = no_counts(light_rays_of(request_), num_rays_);
-    for (std::uint32_t round = 0; round < num_light_rays_; ++round)
-      of_.cast_round(request_, round, placed, open, stats.ambient);
+    const LightRays light_rays = light_rays_of(request_);
+    const SentOn sent_on = [this](std::uint32_t surface) {
+      return isowave::core::sent_on(shading_.params.has_map, &params_, surface);
+    };
+    OpenCounts open = no_counts(light_rays, num_rays_);
+    open.by_color = true;
+    for (std::uint32_t round = 0; round < num_light_rays_; ++round) {
+      if (light_rays.bounces && round < light_rays.num_ambient) {
+        of_.bounce_round(request_, round, sent_on, open, stats.ambient);
+      } else {
+        of_.cast_round(request_, round, placed, open, stats.ambient);
+      }
+    }
+    if (light_rays.bounces) {
+      together(of_.team_, [&] {
+        of_.renderer_.set_open(open);
+        of_.renderer_.filter_bounced(request_);
+        open = of_.renderer_.open();
+      });
+    }
     return open;
   }
 
   /// Returns the number of hits that are seen.
   std::uint64_t blend(std::span<const SentWords> hits, const OpenCounts &open) {
     const bool blends = of_.team_.rank() == 0;
+    const LightOfHits light = open.of_hits();
     std::uint64_t count = 0;
     for (std::size_t ray = 0; ray < num_rays_; ++ray) {
       const std::uint64_t word = words_[ray];
@@ -225,11 +243,9 @@ class TeamRenderer::Layering {
       }
       const auto hit = std::bit_cast<SentHit>(hits[ray]);
       const auto place = static_cast<uint>(ray);
-      seen_[ray] = blend_hit(
-          &frame_, &shading_.params, shading_.color_map.data(), &params_, place, hit_of(word, hit),
-          hit.value, open_share(open.counts.data(), place, open.num_ambient),
-          open_share(open.counts.data(), static_cast<uint>(num_rays_) + place, open.num_shadow),
-          seen_[ray]);
+      seen_[ray] = blend_hit(&frame_, &shading_.params, shading_.color_map.data(), &params_, place,
+                             hit_of(word, hit), hit.value,
+                             light_of_hit(&light, static_cast<uint>(num_rays_), place), seen_[ray]);
     }
     return count;
   }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <bit>
 #include <chrono>
 #include <cmath>
 #include <exception>
@@ -191,11 +192,8 @@ LevelRange TeamRenderer::drawn_levels(const FrameRequest &request) const {
           static_cast<std::size_t>(end - frames.begin())};
 }
 
-/// What rays meet in all bricks, at all ranks.
-///
-/// own   met in this brick
-std::vector<HitRecord> TeamRenderer::compose_met(std::span<const HitRecord> own,
-                                                 std::span<const GivenRay> rays) {
+/// The places of this brick in the orders in which rays go through the bricks.
+std::vector<std::uint32_t> TeamRenderer::places_along(std::span<const GivenRay> rays) const {
   // Rays whose directions have the same signs go through the bricks in the same order.
   std::array<std::uint32_t, 8> place_of{};
   const auto octant_of = [](const GivenRay &ray) {
@@ -208,6 +206,15 @@ std::vector<HitRecord> TeamRenderer::compose_met(std::span<const HitRecord> own,
   std::vector<std::uint32_t> places(rays.size());
   std::ranges::transform(rays, places.begin(),
                          [&](const GivenRay &ray) { return place_of[octant_of(ray)]; });
+  return places;
+}
+
+/// What rays meet in all bricks, at all ranks.
+///
+/// own   met in this brick
+std::vector<HitRecord> TeamRenderer::compose_met(std::span<const HitRecord> own,
+                                                 std::span<const GivenRay> rays) {
+  const std::vector<std::uint32_t> places = places_along(rays);
   std::vector<HitRecord> met(own.size(), no_hit());
   for (const HitField field : kHitFields) {
     reduce(
@@ -223,11 +230,65 @@ std::vector<HitRecord> TeamRenderer::compose_met(std::span<const HitRecord> own,
   return met;
 }
 
+/// The nearest of what rays meet of several surfaces, with their numbers. If hits are at one place,
+/// it is that of the first surface in light_order(), in the brick that the ray meets first.
+std::vector<HitRecord> TeamRenderer::compose_nearest(const FrameRequest &request,
+                                                     std::span<const HitRecord> own,
+                                                     std::span<const GivenRay> rays) {
+  constexpr int kOrderBit = 28;
+  static_assert(ISO_MAX_SURFACES <= 1 << (32 - kOrderBit));
+  constexpr std::uint64_t kNone = ~std::uint64_t{0};
+  constexpr std::size_t kWords = 3;  // of a hit's position and gradient
+  const std::vector<std::uint32_t> places = places_along(rays);
+  const std::vector<std::uint32_t> innermost = innermost_first(request.surfaces);
+  const std::vector<std::size_t> order = light_order(request.surfaces);
+  std::vector<std::uint64_t> words(own.size(), kNone);
+  std::vector<std::array<float, 2 * kWords>> sent(own.size());
+  for (std::size_t ray = 0; ray < own.size(); ++ray) {
+    if (!std::isfinite(own[ray].t)) continue;
+    const auto at = std::ranges::find(order, surface_of(own[ray]),
+                                      [&](std::size_t place) { return innermost[place]; });
+    words[ray] = std::uint64_t{field_key(own[ray].t)} << 32 |
+                 static_cast<std::uint64_t>(at - order.begin()) << kOrderBit | places[ray];
+  }
+  const std::vector<std::uint64_t> own_words = words;
+  const auto [make, take] = in_place(words);
+  reduce(words.size(), Reduction::kMin, Receiver::kAll, make, take);
+  std::vector<std::uint64_t> parts(kWords * own.size());
+  for (std::size_t ray = 0; ray < own.size(); ++ray) {
+    if (words[ray] == kNone || words[ray] != own_words[ray]) continue;
+    const HitRecord &hit = own[ray];
+    const auto part = std::bit_cast<std::array<std::uint64_t, kWords>>(
+        std::array{hit.x, hit.y, hit.z, hit.grad_x, hit.grad_y, hit.grad_z});
+    std::ranges::copy(part, parts.begin() + std::ptrdiff_t(kWords * ray));
+  }
+  const auto [make_parts, take_parts] = in_place(parts);
+  reduce(parts.size(), Reduction::kOr, Receiver::kAll, make_parts, take_parts);
+  std::vector<HitRecord> met(own.size(), no_hit());
+  for (std::size_t ray = 0; ray < own.size(); ++ray) {
+    if (words[ray] == kNone) continue;
+    HitRecord &hit = met[ray];
+    std::array<std::uint64_t, kWords> part{};
+    std::copy_n(parts.begin() + std::ptrdiff_t(kWords * ray), kWords, part.begin());
+    const auto values = std::bit_cast<std::array<float, 2 * kWords>>(part);
+    hit.t = value_of_key(static_cast<std::uint32_t>(words[ray] >> 32));
+    hit.cell = 0;  // the finest level of detail
+    hit.x = values[0];
+    hit.y = values[1];
+    hit.z = values[2];
+    hit.grad_x = values[3];
+    hit.grad_y = values[4];
+    hit.grad_z = values[5];
+    hit = with_surface(hit, innermost[order[words[ray] >> kOrderBit & 0xF]]);
+  }
+  return met;
+}
+
 /// A round of ambient rays that bring light: all ranks get what the rays meet in any brick, and
 /// cast rays from there towards the light. Rank 0 adds the light of those that meet nothing.
 void TeamRenderer::bounce_round(const FrameRequest &request, std::uint32_t round,
-                                std::span<const HitRecord> placed, OpenCounts &open,
-                                LaterPasses &stats) {
+                                const SentOn &sent_on, OpenCounts &open, LaterPasses &stats) {
+  constexpr uint kLevelBits = (1u << ISO_SURFACE_BIT) - 1;  // of a placed_hit()'s cell
   const LightRays light_rays = light_rays_of(request);
   std::vector<HitRecord> own;
   std::vector<GivenRay> rays;
@@ -235,7 +296,8 @@ void TeamRenderer::bounce_round(const FrameRequest &request, std::uint32_t round
     own = renderer_.met_hits(request, round, stats);
     rays = renderer_.light_rays();
   });
-  const std::vector<HitRecord> met = compose_met(own, rays);
+  const std::vector<HitRecord> met =
+      request.surfaces.empty() ? compose_met(own, rays) : compose_nearest(request, own, rays);
   const VolumeInfo &level = whole_levels_[drawn_levels(request).first];
   const AmbientParams params = make_ambient_params(level, light_rays.num_ambient);
   const FrameParams frame =
@@ -247,7 +309,9 @@ void TeamRenderer::bounce_round(const FrameRequest &request, std::uint32_t round
     if (!is_given(rays[i])) continue;
     const bool meets = std::isfinite(met[i].t);
     const uint pattern = ambient_pattern(&frame, static_cast<uint>(i));
-    rays[i] = meets ? bounce_ray(&params, rays[i], met[i],
+    HitRecord placed = met[i];
+    placed.cell &= kLevelBits;
+    rays[i] = meets ? bounce_ray(&params, rays[i], placed,
                                  directions[row * ISO_AMBIENT_PATTERNS + pattern], &brings[i])
                     : no_ray();
     if (!meets) ++open.counts[i];
@@ -261,9 +325,20 @@ void TeamRenderer::bounce_round(const FrameRequest &request, std::uint32_t round
   const auto [make, take] = in_place(blocked);
   reduce(blocked.size(), Reduction::kOr, Receiver::kRank0, make, take);
   ++open.num_bounced;
-  open.bounced.resize(placed.size());
+  open.bounced.resize((open.by_color ? ISO_LAYER_SUMS : 1) * rays.size());
   for (std::size_t i = 0; i < rays.size(); ++i) {
-    if (is_given(rays[i]) && (blocked[i / 64] >> i % 64 & 1) == 0) open.bounced[i] += brings[i];
+    if (!is_given(rays[i]) || (blocked[i / 64] >> i % 64 & 1) != 0) continue;
+    if (!open.by_color) {
+      open.bounced[i] += brings[i];
+      continue;
+    }
+    const auto num_rays = static_cast<uint>(rays.size()), ray = static_cast<uint>(i);
+    const BouncedLight sum = sum_with(bounced_sum(open.bounced.data(), num_rays, ray), brings[i],
+                                      sent_on(surface_of(met[i])));
+    open.bounced[i] = sum.own;
+    open.bounced[num_rays + i] = sum.r;
+    open.bounced[2 * rays.size() + i] = sum.g;
+    open.bounced[3 * rays.size() + i] = sum.b;
   }
 }
 
@@ -285,7 +360,7 @@ void TeamRenderer::add_ambient(const FrameRequest &request, FrameStats &stats) {
   OpenCounts open = no_counts(light_rays, placed.size());
   for (std::uint32_t round = 0; round < light_rays.count() && !stats.cancelled; ++round) {
     if (light_rays.bounces && round < light_rays.num_ambient) {
-      bounce_round(request, round, placed, open, stats.ambient);
+      bounce_round(request, round, {}, open, stats.ambient);
     } else {
       cast_round(request, round, placed, open, stats.ambient);
     }

@@ -2,6 +2,7 @@
 // Draws one brick of a volume, and with its team the picture of the whole: at rank 0, with the bits
 // that one renderer of the whole would draw.
 
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -94,10 +95,16 @@ class TeamRenderer : public Renderer {
   void cast_round(const FrameRequest &request, std::uint32_t round,
                   std::span<const HitRecord> placed, OpenCounts &open, LaterPasses &stats);
   LevelRange drawn_levels(const FrameRequest &request) const;
-  void bounce_round(const FrameRequest &request, std::uint32_t round,
-                    std::span<const HitRecord> placed, OpenCounts &open, LaterPasses &stats);
+  /// The light that a surface of a number sends on.
+  using SentOn = std::function<BouncedLight(std::uint32_t surface)>;
+  void bounce_round(const FrameRequest &request, std::uint32_t round, const SentOn &sent_on,
+                    OpenCounts &open, LaterPasses &stats);
+  std::vector<std::uint32_t> places_along(std::span<const GivenRay> rays) const;
   std::vector<HitRecord> compose_met(std::span<const HitRecord> own,
                                      std::span<const GivenRay> rays);
+  std::vector<HitRecord> compose_nearest(const FrameRequest &request,
+                                         std::span<const HitRecord> own,
+                                         std::span<const GivenRay> rays);
   void add_ambient(const FrameRequest &request, FrameStats &stats);
   void reduce(std::size_t count, Reduction how, Receiver who, const MakeWords &make,
               const TakeWords &take);

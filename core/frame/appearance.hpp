@@ -79,9 +79,11 @@ struct OpenCounts {
   std::uint32_t num_shadow = 0;   ///< shadow rays of each hit; 0: there are none
   std::vector<float> bounced{};   ///< [height * width] by ray: LightOfHits::bounced, filtered
   std::uint32_t num_bounced = 0;  ///< ambient rays in these sums; 0: light does not bounce
+  bool by_color = false;          ///< of layers: bounced is [ISO_LAYER_SUMS][height * width]
 
   LightOfHits of_hits() const {
-    return {counts.data(), num_ambient, num_shadow, bounced.data(), num_bounced};
+    return {counts.data(),  num_ambient, num_shadow,
+            bounced.data(), num_bounced, by_color ? 1u : 0u};
   }
 };
 

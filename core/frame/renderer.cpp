@@ -36,7 +36,6 @@ void check_choices(const FrameRequest &request) {
     leave_out(has_labels && request.max_surface_error, "max_surface_error");
     leave_out(request.max_image_error.has_value(), "max_image_error");
     leave_out(request.time_budget_ms.has_value(), "time_budget_ms");
-    leave_out(request.bounce_rays != 0, "bounced light");
     if (light_rays_of(request).count() != 0) check_some_are_opaque(request.surfaces);
   }
   if (request.field_values && request.time_budget_ms)

@@ -79,6 +79,18 @@ std::vector<float> isovalues_of_layers(const std::vector<SurfaceStyle> &surfaces
   return isovalues;
 }
 
+std::vector<std::size_t> light_order(const std::vector<SurfaceStyle> &surfaces) {
+  const std::vector<std::uint32_t> numbers = innermost_first(surfaces);
+  std::vector<std::size_t> order;
+  for (const bool clipped : {false, true}) {
+    for (std::size_t place = 0; place < numbers.size(); ++place) {
+      const SurfaceStyle &surface = surfaces[numbers[place]];
+      if (surface.opacity == 1 && surface.clipped == clipped) order.push_back(place);
+    }
+  }
+  return order;
+}
+
 bool any_is_whole(const std::vector<SurfaceStyle> &surfaces) {
   return !std::ranges::all_of(surfaces, &SurfaceStyle::clipped);
 }

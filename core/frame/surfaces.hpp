@@ -67,6 +67,10 @@ std::vector<std::uint32_t> innermost_first(const std::vector<SurfaceStyle> &surf
 /// SurfaceStyle::isovalue_of_field() of the surfaces, in that order.
 std::vector<float> isovalues_of_layers(const std::vector<SurfaceStyle> &surfaces);
 
+/// The opaque surfaces, by their places in innermost_first(), in the order in which light rays go
+/// through them: those that clipping planes leave whole come first.
+std::vector<std::size_t> light_order(const std::vector<SurfaceStyle> &surfaces);
+
 /// Whether clipping planes leave one of them whole.
 bool any_is_whole(const std::vector<SurfaceStyle> &surfaces);
 

@@ -149,42 +149,68 @@ inline float value_of_color(const LayerBlend &by, const HostLevel &level, const 
   return value;
 }
 
-/// The shares of the sky and of the scene's light that a hit sees.
-struct HitLight {
-  float open = 1, lit = 1;
-};
-
+/// What a light ray meets: the nearest of the opaque surfaces, first those that planes leave whole.
+///
+/// any  any of them is enough
 template <auto kTraceRay>
-inline HitLight light_of_hit(std::span<const HostLevel> surfaces, const LayerBlend &by, uint ray_id,
-                             const HitRecord &hit) {
-  HitLight light;
+inline HitRecord met_by(std::span<const HostLevel> surfaces, const LayerBlend &by,
+                        const GivenRay &given, bool any) {
+  const FrameParams &seen = surfaces.front().frame;
+  const LastPlanes last = last_planes(&seen);
+  HitRecord nearest = no_hit();
+  GivenRay ray = given;
+  for (const bool clipped : {false, true}) {
+    if (clipped && by.any_is_whole) {
+      const float begin = entry_of(&by.clip, given, by.rays.voxel);
+      ray = ray_from(given, begin);
+      nearest.t = t_from(&seen, nearest.t, begin);
+    }
+    for (const std::size_t place : by.opaque[clipped ? 1 : 0]) {
+      const HostLevel &surface = surfaces[place];
+      HitRecord met;
+      if (kTraceRay(surface.frame, surface.field, active_box(surface.frame.surface, last), last,
+                    make_given_ray(ray), &met) &&
+          met.t < nearest.t &&
+          !(clipped && is_clipped(&by.clip, ray, by.rays.voxel, met.t / seen.view.t_scale)))
+        nearest = with_surface(met, by.numbers[place]);
+      if (any && nearest.t != INFINITY) return nearest;
+    }
+  }
+  return nearest;
+}
+
+/// The light of a hit, of bounced light the sums of its rays.
+template <auto kTraceRay>
+inline HitLight light_of_layer_hit(std::span<const HostLevel> surfaces, const LayerBlend &by,
+                                   uint ray_id, const HitRecord &hit) {
+  HitLight light{1, 1, nothing_bounced()};
   const AmbientRays &rays = by.rays;
   if (rays.num_rays == 0 || is_of_slice(&by.colors, hit)) return light;
   const FrameParams &seen = surfaces.front().frame;
-  const LastPlanes last = last_planes(&seen);
   const HitRecord placed = placed_hit(&seen, 0, hit);
-  const uint pattern = ambient_pattern(&seen, ray_id);
-  HitRecord met;
+  const uint pattern = ambient_pattern(&seen, ray_id), num_ambient = rays.params.num_ambient,
+             num_shadow = rays.num_rays - num_ambient;
   uint num_open[2] = {0, 0};
   for (uint k = 0; k < rays.num_rays; ++k) {
     const GivenRay given = ambient_ray(&seen, &rays.params, placed, ray_id, k,
                                        rays.directions[k * ISO_AMBIENT_PATTERNS + pattern]);
     if (!is_given(given)) continue;
-    num_open[is_shadow_ray(&rays.params, k)] += std::ranges::none_of(by.opaque, [&](auto place) {
-      const HostLevel &surface = surfaces[place];
-      const GivenRay ray = surface.clip != nullptr && by.any_is_whole
-                               ? entering(surface.clip, given, rays.voxel)
-                               : given;
-      return kTraceRay(surface.frame, surface.field, active_box(surface.frame.surface, last), last,
-                       make_given_ray(ray), &met) &&
-             (surface.clip == nullptr ||
-              !is_clipped(surface.clip, ray, rays.voxel, met.t / seen.view.t_scale));
-    });
+    const bool is_shadow = is_shadow_ray(&rays.params, k), brings = rays.bounces && !is_shadow;
+    const HitRecord met = met_by<kTraceRay>(surfaces, by, given, !brings);
+    if (met.t == INFINITY) ++num_open[is_shadow];
+    if (met.t == INFINITY || !brings) continue;
+    const uint row = num_ambient + light_row(num_shadow, k);
+    float cosine = 0;
+    const GivenRay to_light =
+        bounce_ray(&rays.params, given, placed_hit(&seen, 0, met),
+                   rays.directions[row * ISO_AMBIENT_PATTERNS + pattern], &cosine);
+    if (is_given(to_light) && met_by<kTraceRay>(surfaces, by, to_light, true).t == INFINITY)
+      light.bounced = sum_with(light.bounced, cosine,
+                               sent_on(by.shading.params.has_map, &by.colors, surface_of(met)));
   }
   const uchar counts[2] = {static_cast<uchar>(num_open[0]), static_cast<uchar>(num_open[1])};
-  const uint num_ambient = rays.params.num_ambient;
   light.open = open_share(counts, 0, num_ambient);
-  light.lit = open_share(counts, 1, rays.num_rays - num_ambient);
+  light.lit = open_share(counts, 1, num_shadow);
   return light;
 }
 
@@ -194,10 +220,10 @@ inline HitLight light_of_hit(std::span<const HostLevel> surfaces, const LayerBle
 template <auto kTraceBehind, auto kSmooth, auto kTraceRay>
 inline uint blend_packet(std::span<const HostLevel> surfaces, const LayerBlend &by,
                          const LayerPacket &packet, uint lanes, HitRecord *const *next,
-                         HitRecord *hits, RayColor *colors, LayerStats *stats) {
+                         const LayersOfRays &to) {
   uint num_hits = 0;
   for (uint left = lanes; left != 0; left &= left - 1)
-    colors[packet.ray_id(static_cast<uint>(std::countr_zero(left)))] = clear_ray();
+    to.colors[packet.ray_id(static_cast<uint>(std::countr_zero(left)))] = clear_ray();
   HitRecord at[8], behind[8];
   uint passed[8] = {};  // slices
   for (uint layer = 0; lanes != 0; ++layer) {
@@ -216,7 +242,7 @@ inline uint blend_packet(std::span<const HostLevel> surfaces, const LayerBlend &
       if (!is_slice) hit = at[lane] = next[lane][nearest];
       if (hit.t == INFINITY) continue;
       if (layer == ISO_MAX_LAYERS) {
-        ++stats->rays_cut;
+        ++to.stats->rays_cut;
         continue;
       }
       if (!is_slice) {
@@ -227,18 +253,20 @@ inline uint blend_packet(std::span<const HostLevel> surfaces, const LayerBlend &
         passed[lane] |= 1u << (surface_of(hit) - by.colors.num_surfaces);
       }
       const float value = value_of_color(by, surface, hit);
-      const HitLight light = light_of_hit<kTraceRay>(surfaces, by, ray_id, hit);
-      colors[ray_id] =
-          blend_hit(&surface.frame, &by.shading.params, by.shading.color_map.data(), &by.colors,
-                    ray_id, hit, value, light.open, light.lit, colors[ray_id]);
-      if (goes_on(colors[ray_id])) (is_slice ? on_behind_slices : on[nearest]) |= 1u << lane;
+      HitLight light = light_of_layer_hit<kTraceRay>(surfaces, by, ray_id, hit);
+      if (to.layers != nullptr) to.layers[layer].push_back({ray_id, hit, value, light});
+      light.bounced = nothing_bounced();  // not filtered yet
+      RayColor &color = to.colors[ray_id];
+      color = blend_hit(&surface.frame, &by.shading.params, by.shading.color_map.data(), &by.colors,
+                        ray_id, hit, value, light, color);
+      if (goes_on(color)) (is_slice ? on_behind_slices : on[nearest]) |= 1u << lane;
       if (is_unseen(&by.colors, hit, value)) continue;
-      if (hits[ray_id].t == INFINITY) {
-        hits[ray_id] = hit;
+      if (to.hits[ray_id].t == INFINITY) {
+        to.hits[ray_id] = hit;
         ++num_hits;
       }
-      ++stats->hits;
-      stats->layers = std::max(stats->layers, layer + 1);
+      ++to.stats->hits;
+      to.stats->layers = std::max(to.stats->layers, layer + 1);
     }
     lanes = on_behind_slices;
     for (std::size_t k = 0; k < surfaces.size(); ++k) {
@@ -257,7 +285,7 @@ inline uint blend_packet(std::span<const HostLevel> surfaces, const LayerBlend &
 
 template <auto kTraceBehind, auto kSmooth, auto kTraceRay>
 inline uint blend(std::span<const HostLevel> surfaces, const LayerBlend &by, const RayTile &tile,
-                  HitRecord *next, HitRecord *hits, RayColor *colors, LayerStats *stats) {
+                  HitRecord *next, const LayersOfRays &to) {
   const uint columns = tile.end_x - tile.begin_x;
   uint num_hits = 0;
   for (uint y = tile.begin_y; y < tile.end_y; y += 2) {
@@ -271,8 +299,7 @@ inline uint blend(std::span<const HostLevel> surfaces, const LayerBlend &by, con
         lanes |= 1u << lane;
       }
       num_hits += blend_packet<kTraceBehind, kSmooth, kTraceRay>(
-          surfaces, by, {x, y, surfaces.front().frame.view.width}, lanes, of_lanes, hits, colors,
-          stats);
+          surfaces, by, {x, y, surfaces.front().frame.view.width}, lanes, of_lanes, to);
     }
   }
   return num_hits;

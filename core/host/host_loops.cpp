@@ -225,6 +225,17 @@ inline void filter_bounced(const View &view, uint row, uint apart, const GivenRa
     filtered[ray_id] = filtered_light(view.width, view.height, places, bounced, ray_id, apart);
 }
 
+inline void blend_lit(const FrameParams &frame, const LayerBlend &by,
+                      std::span<const LayerHit> layer, const float *sums, RayColor *colors) {
+  for (const LayerHit &at : layer) {
+    HitLight light = at.light;
+    light.bounced = share_of_sum(bounced_sum(sums, frame.view.width * frame.view.height, at.ray),
+                                 by.rays.params.num_ambient);
+    colors[at.ray] = blend_hit(&frame, &by.shading.params, by.shading.color_map.data(), &by.colors,
+                               at.ray, at.hit, at.value, light, colors[at.ray]);
+  }
+}
+
 inline void store_pixel(uint rgba, uint channels, std::uint8_t *pixel) {
   for (uint channel = 0; channel < 3; ++channel)
     pixel[channel] = static_cast<std::uint8_t>(rgba >> (8 * channel));
@@ -304,10 +315,15 @@ ISO_OF_ITS_OWN ISO_WHOLE_LOOP bool trace_ray_behind_anywhere(const HostLevel &su
       surface, ray_id, hit, next);
 }
 ISO_WHOLE_LOOP uint blend_rays_anywhere(std::span<const HostLevel> surfaces, const LayerBlend &by,
-                                        const RayTile &tile, HitRecord *next, HitRecord *hits,
-                                        RayColor *colors, LayerStats *stats) {
+                                        const RayTile &tile, HitRecord *next,
+                                        const LayersOfRays &to) {
   return blend<trace_rays_behind<trace_ray_behind_anywhere>, smooth_hit_anywhere,
-               trace_ray_anywhere>(surfaces, by, tile, next, hits, colors, stats);
+               trace_ray_anywhere>(surfaces, by, tile, next, to);
+}
+ISO_WHOLE_LOOP void blend_lit_anywhere(const FrameParams &frame, const LayerBlend &by,
+                                       std::span<const LayerHit> layer, const float *sums,
+                                       RayColor *colors) {
+  blend_lit(frame, by, layer, sums, colors);
 }
 ISO_WHOLE_LOOP void shade_layers_anywhere(const FrameParams &frame, const ShadeParams &params,
                                           uint samples, uint row, const RayColor *colors,
@@ -394,16 +410,19 @@ ISO_OF_ITS_OWN ISO_WIDE_LOOP bool trace_ray_behind_wide(const HostLevel &surface
                                                                                     hit, next);
 }
 ISO_WIDE_LOOP uint blend_wide(std::span<const HostLevel> surfaces, const LayerBlend &by,
-                              const RayTile &tile, HitRecord *next, HitRecord *hits,
-                              RayColor *colors, LayerStats *stats) {
+                              const RayTile &tile, HitRecord *next, const LayersOfRays &to) {
   return blend<trace_packets_behind<trace_ray_in_cell_wide, trace_packet_behind>, smooth_hit_wide,
-               trace_ray_wide>(surfaces, by, tile, next, hits, colors, stats);
+               trace_ray_wide>(surfaces, by, tile, next, to);
 }
 ISO_WIDE_LOOP uint blend_rays_wide(std::span<const HostLevel> surfaces, const LayerBlend &by,
-                                   const RayTile &tile, HitRecord *next, HitRecord *hits,
-                                   RayColor *colors, LayerStats *stats) {
+                                   const RayTile &tile, HitRecord *next, const LayersOfRays &to) {
   return blend<trace_rays_behind<trace_ray_behind_wide>, smooth_hit_wide, trace_ray_wide>(
-      surfaces, by, tile, next, hits, colors, stats);
+      surfaces, by, tile, next, to);
+}
+ISO_WIDE_LOOP void blend_lit_wide(const FrameParams &frame, const LayerBlend &by,
+                                  std::span<const LayerHit> layer, const float *sums,
+                                  RayColor *colors) {
+  blend_lit(frame, by, layer, sums, colors);
 }
 ISO_WIDE_LOOP void shade_layers_wide(const FrameParams &frame, const ShadeParams &params,
                                      uint samples, uint row, const RayColor *colors,
@@ -424,10 +443,9 @@ uint trace_levels_sse4(std::span<const HostLevel> levels, const RayTile &tile, b
       is_smooth, hits);
 }
 uint blend_sse4(std::span<const HostLevel> surfaces, const LayerBlend &by, const RayTile &tile,
-                HitRecord *next, HitRecord *hits, RayColor *colors, LayerStats *stats) {
+                HitRecord *next, const LayersOfRays &to) {
   return blend<trace_packets_behind<trace_ray_in_cell_anywhere, trace_packet_behind_sse4>,
-               smooth_hit_anywhere, trace_ray_anywhere>(surfaces, by, tile, next, hits, colors,
-                                                        stats);
+               smooth_hit_anywhere, trace_ray_anywhere>(surfaces, by, tile, next, to);
 }
 
 /// With fused multiply-add, single rays are faster.
@@ -447,15 +465,16 @@ constexpr HostLoops kLoops[] = {
      trace_rays<trace_rays_of_levels_anywhere>, trace_rays_of_levels_anywhere,
      trace_rays_of_levels_anywhere, cast_anywhere, ambient_anywhere, place_hits_anywhere,
      filter_bounced_anywhere, shade_anywhere, blend_rays_anywhere, blend_rays_anywhere,
-     shade_layers_anywhere},
+     blend_lit_anywhere, shade_layers_anywhere},
 #ifdef ISO_HAS_WIDE_LOOPS
     {decode_anywhere, ranges_anywhere, inside_anywhere, trace_sse4,
      trace_rays<trace_rays_of_levels_anywhere>, trace_levels_sse4, trace_rays_of_levels_anywhere,
      cast_anywhere, ambient_anywhere, place_hits_anywhere, filter_bounced_anywhere, shade_anywhere,
-     blend_sse4, blend_rays_anywhere, shade_layers_anywhere},
+     blend_sse4, blend_rays_anywhere, blend_lit_anywhere, shade_layers_anywhere},
     {decode_wide, ranges_wide, inside_wide, trace_wide, trace_rays<trace_rays_of_levels_wide>,
      trace_levels_wide, trace_rays_of_levels_wide, cast_wide, ambient_wide, place_hits_wide,
-     filter_bounced_wide, shade_wide, blend_wide, blend_rays_wide, shade_layers_wide},
+     filter_bounced_wide, shade_wide, blend_wide, blend_rays_wide, blend_lit_wide,
+     shade_layers_wide},
 #endif
 };
 

@@ -4,6 +4,7 @@
 // which the C library otherwise computes in software. The program chooses when it runs. Both give
 // the same bits.
 
+#include <array>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
@@ -130,12 +131,29 @@ struct LayerBlend {
   LayerParams colors{};
   std::vector<std::uint32_t> numbers{};    ///< innermost_first()
   bool is_smooth = true;                   ///< Normals::kSmooth
-  ClipParams clip{};                       ///< of slices
+  ClipParams clip{};                       ///< of slices, and of surfaces that are clipped
   FieldMap slice_map{};                    ///< from hits on slices to the volume
   const HostFieldValues *field = nullptr;  ///< for colours of the surfaces; null: none
   AmbientRays rays{};                      ///< of the hits of each layer
-  std::vector<std::size_t> opaque{};       ///< the surfaces that such rays may meet
-  bool any_is_whole = false;               ///< of all surfaces
+  /// The surfaces that such rays may meet: those that clipping planes leave whole, and the others.
+  std::array<std::vector<std::size_t>, 2> opaque{};
+  bool any_is_whole = false;  ///< of all surfaces
+};
+
+/// A hit of a layer on a surface or a slice, with its light: sums of what ambient rays bring.
+struct LayerHit {
+  uint ray;
+  HitRecord hit;
+  float value;  ///< by which its colour is: see blend_hit()
+  HitLight light;
+};
+
+/// The layers of a frame's rays.
+struct LayersOfRays {
+  HitRecord *hits;    ///< [height * width] the first layer, of rays that hit something
+  RayColor *colors;   ///< [height * width]
+  LayerStats *stats;  ///< what is blended is added
+  std::vector<LayerHit> *layers = nullptr;  ///< [ISO_MAX_LAYERS] get the hits; null: no one asks
 };
 
 struct HostLoops {
@@ -198,15 +216,19 @@ struct HostLoops {
   ///
   /// surfaces  [surface] innermost first
   /// next      [ray of the tile][surface] their first hits, with gradients of cells; overwritten
-  /// Out       of the tile's rays, hits [height * width]: the first layer, of rays that hit
-  ///           something; colors [height * width]
-  ///           *stats: what is blended is added
+  /// to        those of the tile's rays are set
   /// Returns   number of rays that hit something
   uint (*blend)(std::span<const HostLevel> surfaces, const LayerBlend &by, const RayTile &tile,
-                HitRecord *next, HitRecord *hits, RayColor *colors, LayerStats *stats);
+                HitRecord *next, const LayersOfRays &to);
   /// The same, ray by ray.
   uint (*blend_rays)(std::span<const HostLevel> surfaces, const LayerBlend &by, const RayTile &tile,
-                     HitRecord *next, HitRecord *hits, RayColor *colors, LayerStats *stats);
+                     HitRecord *next, const LayersOfRays &to);
+  /// Blends hits of a layer behind the layers before, with the filtered light of their sums.
+  ///
+  /// sums    [ISO_LAYER_SUMS][height * width] of bounced light: see LightOfHits
+  /// colors  [height * width]
+  void (*blend_lit)(const FrameParams &frame, const LayerBlend &by, std::span<const LayerHit> layer,
+                    const float *sums, RayColor *colors);
   /// As shade(), of blended rays. colors: [height * width]
   void (*shade_layers)(const FrameParams &frame, const ShadeParams &params, uint samples, uint row,
                        const RayColor *colors, std::uint8_t *picture);

@@ -208,17 +208,18 @@ void HostRenderer::draw_surfaces(const FrameRequest &request, const FrameParams 
              light_rays.count(),
              &frame,
              0,
-             1};
+             1,
+             light_rays.bounces};
   by.any_is_whole = any_is_whole(request.surfaces);
-  for (std::size_t k = 0; k < by.numbers.size(); ++k) {
-    if (request.surfaces[by.numbers[k]].opacity == 1) by.opaque.push_back(k);
-  }
+  for (const std::size_t place : light_order(request.surfaces))
+    by.opaque[request.surfaces[by.numbers[place]].clipped ? 1 : 0].push_back(place);
   std::vector<HostLevel> surfaces = open_surfaces(request, frame, by.numbers);
   for (std::size_t k = 0; k < surfaces.size(); ++k) {
     if (request.surfaces[by.numbers[k]].clipped)
       clip_levels({&surfaces[k], 1}, by.clip, frame.screen);
   }
-  std::mutex stats_mutex;
+  std::mutex mutex;
+  LayerHits layers(light_rays.bounces ? ISO_MAX_LAYERS : 0);
   const auto draw_tile = [&](const RayTile &tile, bool is_alone) {
     const std::uint32_t columns = tile.end_x - tile.begin_x,
                         num_rays = columns * (tile.end_y - tile.begin_y);
@@ -232,15 +233,57 @@ void HostRenderer::draw_surfaces(const FrameRequest &request, const FrameParams 
       }
     }
     LayerStats of_tile;
+    LayerHits layers_of_tile(layers.size());
     const auto blend = is_alone ? host_loops().blend_rays : host_loops().blend;
-    const std::uint64_t num_hits =
-        blend(surfaces, by, tile, next.data(), hits_.data(), colors_.data(), &of_tile);
-    const std::scoped_lock lock(stats_mutex);
+    const std::uint64_t num_hits = blend(
+        surfaces, by, tile, next.data(),
+        {hits_.data(), colors_.data(), &of_tile, layers.empty() ? nullptr : layers_of_tile.data()});
+    const std::scoped_lock lock(mutex);
     stats.layers.add(of_tile);
+    for (std::size_t layer = 0; layer < layers.size(); ++layer)
+      layers[layer].insert(layers[layer].end(), layers_of_tile[layer].begin(),
+                           layers_of_tile[layer].end());
     return num_hits;
   };
-  draw_picture(frame, size, std::vector<RayColor>(size.num_rays(), clear_ray()),
-               [&] { draw_bands(request, draw_tile, stats); });
+  draw_picture(frame, size, std::vector<RayColor>(size.num_rays(), clear_ray()), [&] {
+    draw_bands(request, draw_tile, stats);
+    if (light_rays.bounces && !stats.cancelled) blend_bounced(frame, by, layers);
+  });
+}
+
+/// Blends all layers again, with the light that ambient rays have brought to them, filtered.
+void HostRenderer::blend_bounced(const FrameParams &frame, const LayerBlend &by,
+                                 const LayerHits &layers) {
+  constexpr std::size_t kRun = 4096;
+  const std::size_t num_rays = hits_.size();
+  std::ranges::fill(colors_, clear_ray());
+  for (const std::vector<LayerHit> &layer : layers) {
+    if (layer.empty()) break;
+    std::vector<HitRecord> hits(num_rays, no_hit());
+    std::array<std::vector<float>, ISO_LAYER_SUMS> parts;
+    for (std::vector<float> &part : parts) part.assign(num_rays, 0);
+    for (const LayerHit &at : layer) {
+      const BouncedLight &sum = at.light.bounced;
+      parts[0][at.ray] = sum.own;
+      parts[1][at.ray] = sum.r;
+      parts[2][at.ray] = sum.g;
+      parts[3][at.ray] = sum.b;
+      if (!is_of_slice(&by.colors, at.hit)) hits[at.ray] = at.hit;
+    }
+    const std::vector<GivenRay> places = places_of(frame, by.rays.params, hits);
+    std::vector<float> sums;
+    for (std::vector<float> &part : parts) {
+      filter_bounced(frame.view, places, part);
+      sums.insert(sums.end(), part.begin(), part.end());
+    }
+    parallel_for(
+        rounded_up(layer.size(), kRun), num_threads_, [&](std::uint64_t run, std::uint32_t) {
+          const std::size_t begin = run * kRun;
+          host_loops().blend_lit(
+              frame, by, std::span(layer).subspan(begin, std::min(kRun, layer.size() - begin)),
+              sums.data(), colors_.data());
+        });
+  }
 }
 
 /// Traces a tile's rays, whose hits are no_hit() before.
@@ -325,25 +368,31 @@ void HostRenderer::add_ambient(const FrameRequest &request, std::span<const Host
         ++stats.ambient.passes;
         return pass;
       });
-  if (light_rays.bounces && !stats.cancelled) filter_bounced(seen, params);
+  if (light_rays.bounces && !stats.cancelled)
+    filter_bounced(seen.view, places_of(seen, params, hits_), open_.bounced);
   stats.ambient.ms = ms_since(begin);
 }
 
-void HostRenderer::filter_bounced(const FrameParams &frame, const AmbientParams &params) {
-  const auto for_rows = [&](const auto &do_row) {
-    parallel_for(frame.view.height, num_threads_,
-                 [&](std::uint64_t row, std::uint32_t) { do_row(static_cast<uint>(row)); });
-  };
-  std::vector<GivenRay> places(hits_.size());
-  for_rows(
-      [&](uint row) { host_loops().place_hits(frame, params, row, hits_.data(), places.data()); });
-  std::vector<float> filtered(hits_.size());
+/// The normal_ray()s of hits [height * width].
+std::vector<GivenRay> HostRenderer::places_of(const FrameParams &frame, const AmbientParams &params,
+                                              std::span<const HitRecord> hits) const {
+  std::vector<GivenRay> places(hits.size());
+  parallel_for(frame.view.height, num_threads_, [&](std::uint64_t row, std::uint32_t) {
+    host_loops().place_hits(frame, params, static_cast<uint>(row), hits.data(), places.data());
+  });
+  return places;
+}
+
+/// light: [height * width]
+void HostRenderer::filter_bounced(const View &view, std::span<const GivenRay> places,
+                                  std::vector<float> &light) const {
+  std::vector<float> filtered(light.size());
   for (uint step = 0; step < ISO_BOUNCE_STEPS; ++step) {
-    for_rows([&](uint row) {
-      host_loops().filter_bounced(frame.view, row, 1u << step, places.data(), open_.bounced.data(),
-                                  filtered.data());
+    parallel_for(view.height, num_threads_, [&](std::uint64_t row, std::uint32_t) {
+      host_loops().filter_bounced(view, static_cast<uint>(row), 1u << step, places.data(),
+                                  light.data(), filtered.data());
     });
-    open_.bounced.swap(filtered);
+    light.swap(filtered);
   }
 }
 

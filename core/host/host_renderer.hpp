@@ -101,7 +101,12 @@ class HostRenderer : public Renderer {
   void add_field_values(const FrameRequest &request, FrameStats &stats);
   void add_ambient(const FrameRequest &request, std::span<const HostLevel> drawing,
                    FrameStats &stats);
-  void filter_bounced(const FrameParams &frame, const AmbientParams &params);
+  std::vector<GivenRay> places_of(const FrameParams &frame, const AmbientParams &params,
+                                  std::span<const HitRecord> hits) const;
+  void filter_bounced(const View &view, std::span<const GivenRay> places,
+                      std::vector<float> &light) const;
+  using LayerHits = std::vector<std::vector<LayerHit>>;  ///< [layer] of all rays
+  void blend_bounced(const FrameParams &frame, const LayerBlend &by, const LayerHits &layers);
   template <class Draw, class After>
   bool for_bands(const OnPass &on_pass, bool more_follows, Draw draw, After after);
 

@@ -65,7 +65,9 @@ class DeviceRenderer::BrickRound {
       : frame{never_stops_, 1}, of_(of), stats_(stats) {
     of_.rays_.frame = of_.blocks_.level_frames->front();
     const std::size_t level = of_.blocks_.drawing.first;
-    of_.ambient_->begin(of_.blocks_.levels[level].info, level, light_rays_of(request));
+    const LightRays light_rays = light_rays_of(request);
+    of_.ambient_->begin(of_.blocks_.levels[level].info, level, light_rays);
+    if (light_rays.bounces) of_.bounce_->begin(of_.blocks_.levels[level].info, level, light_rays);
   }
   ~BrickRound() { of_.rays_.frame = of_.blocks_.levels[0].frame; }  // for shading
   BrickRound(const BrickRound &) = delete;
@@ -96,9 +98,8 @@ std::vector<std::uint64_t> DeviceRenderer::blocked_rays(const FrameRequest &requ
     cast_round(round, at_work.frame, goes_on);
     ambient_->block(rays_);
   } else {
-    const ClipParams clip =
-        make_clip_params(blocks_.levels[0].info, rays_.frame.view, request.camera, request.clip);
-    cast_layer_round(round, request, clip, isovalues_of_layers(request.surfaces), at_work.frame);
+    cast_layer_round(round, request, clip_of(request), isovalues_of_layers(request.surfaces),
+                     goes_on ? RoundEnd::kBlocksLight : RoundEnd::kBlocks, at_work.frame);
   }
   const std::vector<GivenRay> left = light_rays();
   std::vector<std::uint64_t> blocked((left.size() + 63) / 64);
@@ -111,8 +112,20 @@ std::vector<std::uint64_t> DeviceRenderer::blocked_rays(const FrameRequest &requ
 std::vector<HitRecord> DeviceRenderer::met_hits(const FrameRequest &request, std::uint32_t round,
                                                 LaterPasses &stats) {
   BrickRound at_work(*this, request, stats);
-  cast_round(round, at_work.frame);
   std::vector<HitRecord> met(size_.num_rays());
+  if (!request.surfaces.empty()) {
+    layers_->forget(rays_, bounce_->nearest);
+    cast_layer_round(round, request, clip_of(request), isovalues_of_layers(request.surfaces),
+                     RoundEnd::kNearest, at_work.frame);
+    bounce_->nearest.read(met);
+    at_work.close();
+    for (HitRecord &hit : met) {
+      if (hit.t != std::numeric_limits<float>::infinity())
+        hit = with_surface(placed(hit), surface_of(hit));
+    }
+    return met;
+  }
+  cast_round(round, at_work.frame);
   rays_.given_hits.read(met);
   const std::vector<GivenRay> rays = light_rays();
   const float voxel = std::ldexp(1.0f, static_cast<int>(blocks_.drawing.first));
@@ -126,6 +139,10 @@ std::vector<HitRecord> DeviceRenderer::met_hits(const FrameRequest &request, std
   }
   at_work.close();
   return placed(std::move(met), 0);
+}
+
+ClipParams DeviceRenderer::clip_of(const FrameRequest &request) const {
+  return make_clip_params(blocks_.levels[0].info, rays_.frame.view, request.camera, request.clip);
 }
 
 std::vector<GivenRay> DeviceRenderer::light_rays() const {
@@ -152,7 +169,7 @@ void DeviceRenderer::filter_bounced(const FrameRequest &request) {
   rays_.frame = blocks_.level_frames->front();
   const std::size_t level = blocks_.drawing.first;
   bounce_->begin(blocks_.levels[level].info, level, light_rays_of(request));
-  bounce_->filter(rays_);
+  bounce_->filter(rays_, request.surfaces.empty() ? 1 : ISO_LAYER_SUMS);
   rays_.frame = blocks_.levels[0].frame;  // for shading
 }
 

@@ -106,28 +106,63 @@ std::size_t DeviceRenderer::find_first_hits(const FrameRequest &request, const C
 /// Casts ambient and shadow rays from the hits of a layer, in rays_.hits.
 void DeviceRenderer::light_layer(const FrameRequest &request, const ClipParams &clip,
                                  std::span<const float> isovalues, Frame &frame) {
-  const std::uint32_t num_rounds = light_rays_of(request).count();
-  for (std::uint32_t round = 0; round < num_rounds; ++round)
-    cast_layer_round(round, request, clip, isovalues, frame);
-  if (!frame.stats.cancelled) count_last_round(num_rounds, frame);
+  const LightRays light_rays = light_rays_of(request);
+  for (std::uint32_t round = 0; round < light_rays.count(); ++round) {
+    if (light_rays.bounces && round < light_rays.num_ambient) {
+      bounce_layer_round(round, request, clip, isovalues, frame);
+    } else {
+      cast_layer_round(round, request, clip, isovalues, RoundEnd::kBlocks, frame);
+    }
+  }
+  if (frame.stats.cancelled) return;
+  count_last_round(light_rays.count(), frame);
+  if (!light_rays.bounces) return;
+  {
+    const auto stage = device_.timer().stage("bounce");
+    bounce_->filter(rays_, ISO_LAYER_SUMS);
+  }
+  add_stage_times(frame.stats.ambient);
+}
+
+/// A round of ambient rays that bring the light and the colour of the nearest opaque surface.
+void DeviceRenderer::bounce_layer_round(std::uint32_t round, const FrameRequest &request,
+                                        const ClipParams &clip, std::span<const float> isovalues,
+                                        Frame &frame) {
+  if (frame.stats.cancelled) return;
+  layers_->forget(rays_, bounce_->nearest);
+  cast_layer_round(round, request, clip, isovalues, RoundEnd::kNearest, frame);
+  if (frame.stats.cancelled) return;
+  {
+    const auto stage = device_.timer().stage("bounce");
+    rays_.set_clip({});  // what was clipped is no nearest hit
+    bounce_->go_to_light(rays_, round, bounce_->nearest);
+  }
+  cast_layer_round(round, request, clip, isovalues, RoundEnd::kBlocksLight, frame);
+  if (frame.stats.cancelled) return;
+  const auto stage = device_.timer().stage("bounce");
+  bounce_->add_colored(rays_, round, layers_->params(), layers_->has_map());
 }
 
 /// Casts one light ray of each hit of a layer, which may meet any opaque surface: first those that
 /// clipping planes leave whole.
 void DeviceRenderer::cast_layer_round(std::uint32_t round, const FrameRequest &request,
                                       const ClipParams &clip, std::span<const float> isovalues,
-                                      Frame &frame) {
-  const bool may_begin_outside = clip.num_planes != 0 && any_is_whole(request.surfaces);
-  bool goes_on = false;
-  for (const bool clipped : {false, true}) {
-    bool enters = clipped && may_begin_outside;
-    for (std::size_t place = 0; place < isovalues.size() && !frame.stats.cancelled; ++place) {
-      const SurfaceStyle &surface = request.surfaces[layers_->surface_at(place)];
-      if (surface.opacity < 1 || surface.clipped != clipped) continue;
-      show_surface(request, clip, place, isovalues[place]);
-      rays_.frame.screen = layers_screen_;  // of all hits
-      ambient_round_->set_round(round, std::exchange(goes_on, true), std::exchange(enters, false));
-      run(*ambient_round_, frame);
+                                      RoundEnd end, Frame &frame) {
+  bool may_enter = clip.num_planes != 0 && any_is_whole(request.surfaces);
+  bool goes_on = end == RoundEnd::kBlocksLight;
+  ocl::Buffer<HitRecord> *const nearest = end == RoundEnd::kNearest ? &bounce_->nearest : nullptr;
+  for (const std::size_t place : light_order(request.surfaces)) {
+    // A frame that is stopped has the first hits of fewer surfaces.
+    if (place >= isovalues.size() || frame.stats.cancelled) break;
+    const std::uint32_t number = layers_->surface_at(place);
+    const bool enters = request.surfaces[number].clipped && std::exchange(may_enter, false);
+    show_surface(request, clip, place, isovalues[place]);
+    rays_.frame.screen = layers_screen_;  // of all hits
+    ambient_round_->set_round(round, std::exchange(goes_on, true), enters, nearest);
+    run(*ambient_round_, frame);
+    if (nearest != nullptr) {
+      bounce_->take_nearest(rays_, number);
+    } else {
       ambient_->block(rays_);
     }
   }
@@ -143,8 +178,8 @@ LayerCounts DeviceRenderer::draw_layer(std::uint32_t layer, const FrameRequest &
              has_field = is_drawn && request.field_values;
   if (is_further) layers_->swap_layer(rays_);
   is_in_further_layer_ = is_further;
-  rays_.num_ambient = rays_.num_shadow = 0;
-  if (is_further && is_lit) layers_->forget_hits(rays_);
+  rays_.num_ambient = rays_.num_shadow = rays_.num_bounced = 0;
+  if (is_further && is_lit) layers_->forget(rays_, rays_.hits);
   layers_->choose(rays_, isovalues.size(), !is_further);
   rays_.frame.screen = layers_screen_;
   if (is_drawn && !request.slices.planes.empty()) {

@@ -66,9 +66,10 @@ FrameStats DeviceRenderer::render(const FrameRequest &request) {
   frame.stats.last_level = blocks_.drawing.end - 1;
   if (light_rays.count() != 0) {
     const VolumeInfo &info = blocks_.levels[blocks_.drawing.first].info;
-    ambient_->begin(info, blocks_.drawing.first, light_rays,
-                    static_cast<std::uint32_t>(std::max<std::size_t>(request.surfaces.size(), 1)));
-    if (light_rays.bounces) bounce_->begin(info, blocks_.drawing.first, light_rays);
+    const auto num_surfaces =
+        static_cast<std::uint32_t>(std::max<std::size_t>(request.surfaces.size(), 1));
+    ambient_->begin(info, blocks_.drawing.first, light_rays, num_surfaces);
+    if (light_rays.bounces) bounce_->begin(info, blocks_.drawing.first, light_rays, num_surfaces);
   }
   if (request.surfaces.empty()) {
     draw_surface(request, frame);
@@ -185,7 +186,7 @@ void DeviceRenderer::bounce_round(std::uint32_t round, Frame &frame) {
   if (frame.stats.cancelled) return;
   {
     const auto stage = device_.timer().stage("bounce");
-    bounce_->go_to_light(rays_, round);
+    bounce_->go_to_light(rays_, round, rays_.given_hits);
   }
   cast_round(round, frame, true);
   if (frame.stats.cancelled) return;
@@ -225,7 +226,9 @@ DeviceRenderer::DeviceRenderer(ocl::Device &device, const CompressedVolume &volu
     ambient_.emplace(device, rays_.num_rays, blocks_.levels.size() > 1, is_brick());
     ambient_round_.emplace(blocks_, rays_, *ambient_, *given_rays_);
   }
-  if (options_.with_bounce) bounce_.emplace(device, rays_.num_rays, blocks_.levels.size() > 1);
+  if (options_.with_bounce)
+    bounce_.emplace(device, rays_.num_rays, blocks_.levels.size() > 1,
+                    options_.max_surfaces != 0 ? rays_.num_rays : 0);
   if (options_.field != nullptr) {
     field_.emplace(device, *options_.field, options_.field == &volume, levels(), plan.field,
                    options_.group_size, rays_);
@@ -270,8 +273,12 @@ void DeviceRenderer::compile_kernels() {
     if (ambient_ && (behind_ || is_brick())) ambient_->block(rays);
     if (ambient_ && behind_) ambient_->enter(rays);
     if (bounce_) {
-      bounce_->go_to_light(rays, 0);
+      bounce_->go_to_light(rays, 0, rays.given_hits);
       bounce_->add(rays, 0);
+      if (behind_ && num_levels == 1) {
+        bounce_->take_nearest(rays, 0);
+        bounce_->add_colored(rays, 0, layers_->params(), 0);
+      }
       bounce_->filter(rays);
     }
     for (Wave *wave : waves) {
@@ -286,7 +293,7 @@ void DeviceRenderer::compile_kernels() {
   blocks_.cache.count_touched(rays, true);
   for (Level &level : blocks_.levels)
     level.decode.compile(level.stream, rays.counts, blocks_.cache);
-  if (options_.with_shading) shade_.compile(rays);
+  if (options_.with_shading) shade_.compile(rays, layers_ ? &layers_->colors : nullptr);
   if (kept_) kept_->compile(rays);
   rays.reset_counts();
 }
@@ -546,7 +553,8 @@ OpenCounts DeviceRenderer::open() const {
   rays_.open_counts.read(open.counts);
   if (rays_.num_bounced == 0) return open;
   open.num_bounced = rays_.num_bounced;
-  open.bounced.resize(size_.num_rays());
+  open.by_color = has_layers_;
+  open.bounced.resize((open.by_color ? ISO_LAYER_SUMS : 1) * size_.num_rays());
   rays_.bounced.read(open.bounced);
   return open;
 }

@@ -213,8 +213,17 @@ class DeviceRenderer : public Renderer {
                               std::span<const float> isovalues, Frame &frame);
   void light_layer(const FrameRequest &request, const ClipParams &clip,
                    std::span<const float> isovalues, Frame &frame);
+  /// What becomes of rays of a layer's hits that have met a surface.
+  enum class RoundEnd {
+    kBlocks,      ///< they are none, see Ambient::block()
+    kNearest,     ///< the nearest hit is kept, see Bounce::take_nearest()
+    kBlocksLight  ///< they are none, and the round's rays are those towards the light
+  };
+  ClipParams clip_of(const FrameRequest &request) const;
+  void bounce_layer_round(std::uint32_t round, const FrameRequest &request, const ClipParams &clip,
+                          std::span<const float> isovalues, Frame &frame);
   void cast_layer_round(std::uint32_t round, const FrameRequest &request, const ClipParams &clip,
-                        std::span<const float> isovalues, Frame &frame);
+                        std::span<const float> isovalues, RoundEnd end, Frame &frame);
   LayerCounts draw_layer(std::uint32_t layer, const FrameRequest &request, const ClipParams &clip,
                          std::span<const float> isovalues, Frame &frame);
   void find_hits_behind(const FrameRequest &request, const ClipParams &clip,

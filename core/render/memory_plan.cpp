@@ -98,7 +98,9 @@ RendererLimits limits_of(const CompressedVolume &volume, const MemoryRequest &re
                .with_pairs = false,
                .num_levels = grids.size(),
                .with_given = request.with_given_rays,
-               .with_bounce = request.with_bounce,
+               .bounced_sums = !request.with_bounce        ? 0
+                               : request.max_surfaces != 0 ? ISO_LAYER_SUMS
+                                                           : 1,
                .with_field = request.with_field || request.max_surfaces != 0},
       .cache = BlockCache::limits_for(
           make_id_grid(grids), cache_slots, rays, request.sparse_table ? 4 : 2,
@@ -229,7 +231,8 @@ MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &requ
       .add(Shade::sizes(request.num_rays))
       .add(PassReadback::sizes());
   if (request.with_given_rays) plan.buffers.add(Ambient::sizes());
-  if (request.with_bounce) plan.buffers.add(Bounce::sizes());
+  if (request.with_bounce)
+    plan.buffers.add(Bounce::sizes(request.max_surfaces != 0 ? request.num_rays : 0));
   if (limits.layers.max_surfaces != 0)
     plan.buffers.add(Layers::sizes(limits.layers)).add(FieldValues::sizes(0));
   if (limits.kept_rays != 0) plan.buffers.add(KeptPicture::sizes(limits.kept_rays));

@@ -140,7 +140,7 @@ void AmbientRound::begin() {
   }
   if (enters_) {
     const auto stage = blocks_.device.timer().stage("ambient");
-    ambient_.enter(rays_);
+    ambient_.enter(rays_, nearest_);
   }
   given_.go_on();
 }

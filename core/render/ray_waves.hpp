@@ -156,11 +156,13 @@ class AmbientRound : public Wave {
       : blocks_(blocks), rays_(rays), ambient_(ambient), given_(given) {}
 
   /// goes_on  the rays of the round have been made already, for another surface
-  /// enters   Ambient::enter() follows
-  void set_round(std::uint32_t round, bool goes_on = false, bool enters = false) {
+  /// enters   Ambient::enter() follows, with those nearest hits
+  void set_round(std::uint32_t round, bool goes_on = false, bool enters = false,
+                 ocl::Buffer<HitRecord> *nearest = nullptr) {
     round_ = round;
     goes_on_ = goes_on;
     enters_ = enters;
+    nearest_ = nearest;
   }
   void begin() override;
   void enqueue_pass() override { given_.enqueue_pass(); }
@@ -173,6 +175,7 @@ class AmbientRound : public Wave {
   RaysWave &given_;
   std::uint32_t round_ = 0;
   bool goes_on_ = false, enters_ = false;
+  ocl::Buffer<HitRecord> *nearest_ = nullptr;
 };
 
 }  // namespace isowave::core

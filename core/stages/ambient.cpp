@@ -48,8 +48,9 @@ void Ambient::block(Wavefront &rays) {
   block_(range_, rays.frame, rays.clip, level_, rays.given, rays.given_hits);
 }
 
-void Ambient::enter(Wavefront &rays) {
-  enter_(range_, rays.frame, rays.clip, level_, rays.given);
+void Ambient::enter(Wavefront &rays, ocl::Buffer<HitRecord> *nearest) {
+  enter_(range_, rays.frame, rays.clip, level_, nearest != nullptr ? 1 : 0, rays.given,
+         nearest != nullptr ? *nearest : rays.given_hits);
 }
 
 }  // namespace isowave::core

@@ -40,9 +40,9 @@ class Ambient {
   /// Moves the rays of the round to where they enter rays.clip, before they go to the first surface
   /// that it clips.
   ///
-  /// In, Out  rays.given
+  /// In, Out  rays.given; nearest: hits that the rays have already, Bounce::nearest; may be null
   /// Waits    no
-  void enter(Wavefront &rays);
+  void enter(Wavefront &rays, ocl::Buffer<HitRecord> *nearest = nullptr);
 
  private:
   ocl::Range range_;

@@ -58,7 +58,7 @@ void Layers::compile(Wavefront &rays) {
   static constexpr LayerParams kNone{};
   params_.write({&kNone, 1});
   clear(rays);
-  forget_hits(rays);
+  forget(rays, rays.hits);
   choose(rays, 1, true);
   blend(rays, true);
 }
@@ -81,8 +81,8 @@ void Layers::clear(const Wavefront &rays) {
   colors.fill(clear_ray(), 0, std::size_t{rays.frame.view.width} * rays.frame.view.height);
 }
 
-void Layers::forget_hits(Wavefront &rays) {
-  forget_(range_, rays.frame, rays.hits);
+void Layers::forget(const Wavefront &rays, ocl::Buffer<HitRecord> &hits) {
+  forget_(range_, rays.frame, hits);
 }
 
 LayerCounts Layers::blend(Wavefront &rays, bool is_first, uint how) {
@@ -90,8 +90,8 @@ LayerCounts Layers::blend(Wavefront &rays, bool is_first, uint how) {
   next_counts_.write_async({&kNone, 1});
   // While rays.hits are those of a further layer, those of the first are in further_hits_.
   blend_(range_, rays.frame, light_, color_map_, how, is_first ? 1 : 0, params_, counts_, listed_,
-         rays.field_values, rays.open_counts, rays.num_ambient, rays.num_shadow, rays.hits,
-         further_hits_, passed_, colors, next_counts_, next_listed_);
+         rays.field_values, rays.open_counts, rays.num_ambient, rays.num_shadow, rays.bounced,
+         rays.num_bounced, rays.hits, further_hits_, passed_, colors, next_counts_, next_listed_);
   return next_counts_.read().front();
 }
 

@@ -54,15 +54,15 @@ class Layers {
   /// is_first  the frame's first layer; otherwise of the rays that next_layer() has taken
   /// Waits     no
   void choose(Wavefront &rays, std::size_t num_surfaces, bool is_first);
-  /// Makes rays.hits, those of a further layer, no_hit(). Does not wait.
-  void forget_hits(Wavefront &rays);
+  /// Makes hits [R] of a frame's rays no_hit(). Does not wait.
+  void forget(const Wavefront &rays, ocl::Buffer<HitRecord> &hits);
   /// Forgets the colours. Does not wait.
   void clear(const Wavefront &rays);
   /// Blends rays.hits into the colours, and lists the rays that go on.
   ///
   /// how    ISO_BLENDS, ISO_PREVIEWS or ISO_COUNTS_ALONE
-  /// In     rays.field_values of hits on slices; rays.open_counts, num_ambient and num_shadow of
-  ///        the hits
+  /// In     rays.field_values of hits on slices; rays.open_counts, num_ambient, num_shadow,
+  ///        bounced and num_bounced of the hits
   /// Waits  yes
   LayerCounts blend(Wavefront &rays, bool is_first, uint how = ISO_BLENDS);
   /// The hits of rays.hits, before blend().
@@ -87,6 +87,8 @@ class Layers {
              std::optional<std::size_t> place = {});
   /// The layer that swap_layer() would make rays.hits.
   const ocl::Buffer<HitRecord> &further_hits() const { return further_hits_; }
+  const ocl::Buffer<LayerParams> &params() const { return params_; }  ///< [1] of open()
+  uint has_map() const { return light_.has_map; }
 
   ocl::Buffer<RayColor> colors;  ///< [R] the frame's layers so far
 

@@ -39,7 +39,7 @@ Shade::Shade(ocl::Device &device, std::uint64_t max_pixels)
   color_map_.write(on_device_);
 }
 
-void Shade::compile(Wavefront &rays) {
+void Shade::compile(Wavefront &rays, const ocl::Buffer<RayColor> *layers) {
   for (const std::size_t num_pixels :
        {std::size_t{1}, staging_.size() / sizeof(uint)}) {  // PoCL compiles large ones anew
     const auto range = [&](std::size_t items) {
@@ -47,6 +47,9 @@ void Shade::compile(Wavefront &rays) {
     };
     shade_(range(num_items(num_pixels)), FrameParams{}, ShadeParams{}, color_map_, 1, rays.hits,
            rays.open_counts, 0u, 0u, rays.bounced, 0u, rays.field_values, 0u, staging_);
+    if (layers != nullptr)
+      shade_layers_(range(num_items(num_pixels)), FrameParams{}, ShadeParams{}, 1, *layers, 0u,
+                    staging_);
     depths_(range(num_pixels), 0u, 0u, rays.hits, staging_);
     normals_(range(num_pixels / 3 + 1), ShadeParams{}, 0u, 0u, rays.hits, staging_);
   }

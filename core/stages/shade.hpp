@@ -21,7 +21,9 @@ class Shade {
 
   /// Launches the kernels without a pixel to shade, see Device::Compiling. Positions' kernel is
   /// compiled when they are first wanted.
-  void compile(Wavefront &rays);
+  ///
+  /// layers  colours of rays; null: there will be none
+  void compile(Wavefront &rays, const ocl::Buffer<RayColor> *layers = nullptr);
 
   /// The arrays of rays.hits; pictures with the ambient light that rays.open_counts lets through,
   /// or of layers.

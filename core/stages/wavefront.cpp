@@ -6,7 +6,7 @@ namespace isowave::core {
 
 ocl::BufferSizes Wavefront::sizes(const Limits &limits) {
   const std::uint64_t rays = limits.num_rays, pairs = limits.with_pairs ? rays : 0,
-                      given = limits.with_given ? rays : 0, bounced = limits.with_bounce ? rays : 0,
+                      given = limits.with_given ? rays : 0, bounced = limits.bounced_sums * rays,
                       scanned = limits.scanned_pairs ? rays : 0,
                       walks = limits.with_walks ? rays : 0;
   return {ocl::buffer_size<PassCounts>("pass counts", 1),

@@ -27,11 +27,11 @@ struct Wavefront {
   /// Limits that the lengths of its buffers follow from.
   struct Limits {
     std::uint64_t num_rays = 0;
-    bool with_pairs = true;      ///< pipeline `blocks` needs the arrays of ray-block pairs
-    std::size_t num_levels = 1;  ///< of detail
-    bool with_given = false;     ///< there may be rays of RaySource::kGiven
-    bool with_bounce = false;    ///< ambient rays may bring light
-    bool with_field = false;     ///< hits may have values of a field
+    bool with_pairs = true;          ///< pipeline `blocks` needs the arrays of ray-block pairs
+    std::size_t num_levels = 1;      ///< of detail
+    bool with_given = false;         ///< there may be rays of RaySource::kGiven
+    std::uint32_t bounced_sums = 0;  ///< of each ray, if ambient rays may bring light
+    bool with_field = false;         ///< hits may have values of a field
     bool with_walks = true;      ///< rays walk from block to block: false if triangles are drawn
     bool scanned_pairs = false;  ///< there may be frames with Schedule::scanned_pairs
   };
@@ -101,8 +101,8 @@ struct Wavefront {
   ocl::Buffer<GivenRay> given;        ///< [R] of any origin; empty unless there may be some
   ocl::Buffer<HitRecord> given_hits;  ///< [R] hits of given rays
   ocl::Buffer<uchar> open_counts;     ///< [2][R] by pixel: see LightOfHits
-  ocl::Buffer<float> bounced;         ///< [R] by pixel: see LightOfHits; empty unless there may be
-  ocl::Buffer<float> bounced_next;    ///< [R] scratch
+  ocl::Buffer<float> bounced;         ///< [bounced_sums][R] by pixel: see LightOfHits; may be empty
+  ocl::Buffer<float> bounced_next;    ///< [bounced_sums][R] scratch
   std::uint32_t num_ambient = 0, num_shadow = 0, num_bounced = 0;  ///< see LightOfHits
   ocl::Buffer<float> field_values;  ///< [R] by pixel: see field_value.h; empty without a field
   ocl::Buffer<uint> ray_block_ids;  ///< [R] by pixel: where a ray goes on from: RayStand (R_BID)

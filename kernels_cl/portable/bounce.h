@@ -9,11 +9,15 @@
 /// the light that it gets, as a share of the light's own. Shading gives it the surface's colour,
 /// once for each of the two places (shade.h).
 ///
+/// In frames of several surfaces, an ambient ray brings light from the nearest opaque surface that
+/// it meets. That surface's colour goes into the sums (sent_on() of layers.h), and the light of
+/// each layer is filtered by itself.
+///
 /// The mean of a few rays is noisy. So the light of neighbours is averaged, in steps whose taps lie
 /// farther and farther apart (Dammertz et al., "Edge-Avoiding A-Trous Wavelet Transform for fast
 /// Global Illumination Filtering", HPG 2010). Neighbours count less the more their normals differ,
-/// and the farther they lie off the hit's tangent plane. Light has no colour yet, so edges between
-/// colours stay as they are.
+/// and the farther they lie off the hit's tangent plane. Light has not got the hit's colour yet, so
+/// edges between colours stay as they are.
 #ifndef ISOWAVE_BOUNCE_H
 #define ISOWAVE_BOUNCE_H
 

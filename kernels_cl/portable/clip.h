@@ -73,13 +73,13 @@ ISO_INLINE int is_cap(HitRecord hit) {
   return ISO_CLIP && hit.t != INFINITY && (hit.cell & ISO_CAP) != 0;
 }
 
-/// A light ray from where it enters the half spaces of all planes: those of the surfaces that are
-/// clipped, which the surface with its hit need not be. A ray that begins there stays as it is. A
-/// ray that never enters begins where is_clipped() finds that it has left.
+/// How far along a light ray it enters the half spaces of all planes: those of the surfaces that
+/// are clipped, which the surface with its hit need not be. 0: it begins there. A ray that never
+/// enters gets to where is_clipped() finds that it has left.
 ///
 /// given  in the index space of a level of detail
 /// voxel  its voxels' size [voxels of the finest level]
-ISO_INLINE GivenRay entering(ISO_GLOBAL const ClipParams *clip, GivenRay given, float voxel) {
+ISO_INLINE float entry_of(ISO_GLOBAL const ClipParams *clip, GivenRay given, float voxel) {
   float begin = 0.0f;
   for (uint i = 0; i < clip->num_planes; ++i) {
     ISO_GLOBAL const PlaneParams *p = &clip->planes[i];
@@ -88,15 +88,30 @@ ISO_INLINE GivenRay entering(ISO_GLOBAL const ClipParams *clip, GivenRay given, 
     const float t = d > 0.0f ? -(o + p->first_voxel / voxel) / d : 0.0f;
     begin = t > begin ? t : begin;
   }
+  return begin;
+}
+
+/// The ray from a place on its way on.
+ISO_INLINE GivenRay ray_from(GivenRay given, float begin) {
   given.o_x = fma(begin, given.d_x, given.o_x);
   given.o_y = fma(begin, given.d_y, given.o_y);
   given.o_z = fma(begin, given.d_z, given.o_z);
   return given;
 }
 
+/// t of a hit of that ray, if rays of the finest level that draws begin there.
+ISO_INLINE float t_from(const FrameParams *frame, float t, float begin) {
+  return fma(-begin, frame->view.t_scale, t);
+}
+
+/// The ray from where it enters: see entry_of().
+ISO_INLINE GivenRay entering(ISO_GLOBAL const ClipParams *clip, GivenRay given, float voxel) {
+  return ray_from(given, entry_of(clip, given, voxel));
+}
+
 /// Has a ray that begins in front of all planes, or is entering(), left their half spaces at t?
 ///
-/// given, voxel  as of entering()
+/// given, voxel  as of entry_of()
 ISO_INLINE int is_clipped(ISO_GLOBAL const ClipParams *clip, GivenRay given, float voxel, float t) {
   int behind = 0;
   for (uint i = 0; i < clip->num_planes; ++i) {

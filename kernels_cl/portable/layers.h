@@ -157,16 +157,37 @@ ISO_INLINE int has_value_color(const ShadeParams *p, ISO_GLOBAL const LayerParam
          (has_field_colors(p) && (layers->unmapped >> surface_of(hit) & 1u) == 0);
 }
 
+/// Has a surface the colours of a map?
+///
+/// has_map  ShadeParams::has_map
+ISO_INLINE int is_mapped(uint has_map, ISO_GLOBAL const LayerParams *layers, uint surface) {
+  return has_map && (layers->unmapped >> surface & 1u) == 0;
+}
+
+/// The light that a surface sends on of what it gets, as shares of it. Those of a map's colours are
+/// taken for the colour of the place that the light goes to.
+ISO_INLINE BouncedLight sent_on(uint has_map, ISO_GLOBAL const LayerParams *layers, uint surface) {
+  ISO_GLOBAL const SurfaceColor *color = &layers->surfaces[surface];
+  BouncedLight light = nothing_bounced();
+  if (is_mapped(has_map, layers, surface)) {
+    light.own = 1.0f;
+  } else {
+    light.r = color->r;
+    light.g = color->g;
+    light.b = color->b;
+  }
+  return light;
+}
+
 /// Blends a ray's next hit behind what it has seen.
 ///
 /// p          its surface colour is not used
 /// color_map  as surface_color()
 /// value      at the hit, if has_value_color(): of the voxels on a slice, else of the field
-/// open, lit  as shade_ray()
 ISO_INLINE RayColor blend_hit(const FrameParams *frame, const ShadeParams *p,
                               ISO_GLOBAL const uint *color_map,
                               ISO_GLOBAL const LayerParams *layers, uint ray_id, HitRecord hit,
-                              float value, float open, float lit, RayColor seen) {
+                              float value, HitLight light, RayColor seen) {
   ISO_GLOBAL const SurfaceColor *surface = &layers->surfaces[surface_of(hit)];
   Color color;
   float share;
@@ -177,9 +198,9 @@ ISO_INLINE RayColor blend_hit(const FrameParams *frame, const ShadeParams *p,
     color.r = surface->r;
     color.g = surface->g;
     color.b = surface->b;
-    if ((layers->unmapped >> surface_of(hit) & 1u) == 0)
+    if (is_mapped(p->has_map, layers, surface_of(hit)))
       color = surface_color(frame, p, color_map, ray_id, hit.t, value, color);
-    color = shade_ray(frame, p, color, ray_id, hit.grad_x, hit.grad_y, hit.grad_z, open, lit, 0.0f);
+    color = shade_ray(frame, p, color, ray_id, hit.grad_x, hit.grad_y, hit.grad_z, light);
   }
   share = seen.transmittance * surface->opacity;
   seen.r = fma(share, color.r, seen.r);

@@ -135,15 +135,32 @@ ISO_INLINE Color surface_color(const FrameParams *frame, const ShadeParams *p,
   return map_color(color_map, at);
 }
 
-/// The colour of a ray that hits a surface of that colour. open: the share of the sky that
-/// the hit sees, [0,1]; the same share of all lights but the headlight and the scene's gets there.
-/// lit: the share of the scene's light that gets there. bounced: the share of it that comes by way
-/// of another place of a surface of the same colour.
+/// The scene's light that comes to a hit by way of other places, as shares of it.
+typedef struct BouncedLight {
+  float own;      ///< by way of places of the hit's own colour
+  float r, g, b;  ///< by way of places of other colours, times these
+} BouncedLight;
+
+/// The light that gets to a hit.
+typedef struct HitLight {
+  float open;  ///< the share of the sky that it sees, [0,1]; the same share of all lights but the
+               ///< headlight and the scene's gets there
+  float lit;   ///< the share of the scene's light that gets there
+  BouncedLight bounced;
+} HitLight;
+
+ISO_INLINE BouncedLight nothing_bounced(void) {
+  BouncedLight light;
+  light.own = light.r = light.g = light.b = 0.0f;
+  return light;
+}
+
+/// The colour of a ray that hits a surface of that colour.
 ISO_INLINE Color shade_ray(const FrameParams *frame, const ShadeParams *p, Color surface,
-                           uint ray_id, float gx, float gy, float gz, float open, float lit,
-                           float bounced) {
+                           uint ray_id, float gx, float gy, float gz, HitLight of_hit) {
   Ray ray;
-  float nx, ny, nz, vx, vy, vz, ux, uy, uz, n, lengths, cosine, facing, slope, highlight, light;
+  float nx, ny, nz, vx, vy, vz, ux, uy, uz, n, lengths, cosine, facing, slope, highlight, light,
+      own;
   float largest = fabs(gx) > fabs(gy) ? fabs(gx) : fabs(gy);
   int i;
   ray = make_ray(frame, ray_id);
@@ -183,13 +200,14 @@ ISO_INLINE Color shade_ray(const FrameParams *frame, const ShadeParams *p, Color
   slope = p->has_light ? slope * facing : fma(slope, facing, cosine) * 0.70710678f;
   highlight = cosine;
   for (i = 0; i < 5; ++i) highlight *= highlight; /* cosine^32 */
-  light = fma(p->diffuse, cosine, open * p->ambient);
-  if (slope > 0.0f) light = fma((p->has_light ? lit : open) * p->above, slope, light);
+  light = fma(p->diffuse, cosine, of_hit.open * p->ambient);
+  if (slope > 0.0f) light = fma((p->has_light ? of_hit.lit : of_hit.open) * p->above, slope, light);
   highlight *= p->specular;
-  bounced *= p->above;
-  return make_color(fma(surface.r, fma(surface.r, bounced, light), highlight),
-                    fma(surface.g, fma(surface.g, bounced, light), highlight),
-                    fma(surface.b, fma(surface.b, bounced, light), highlight));
+  own = of_hit.bounced.own * p->above;
+  return make_color(
+      fma(surface.r, fma(surface.r, own, fma(of_hit.bounced.r, p->above, light)), highlight),
+      fma(surface.g, fma(surface.g, own, fma(of_hit.bounced.g, p->above, light)), highlight),
+      fma(surface.b, fma(surface.b, own, fma(of_hit.bounced.b, p->above, light)), highlight));
 }
 
 /// What the light rays of hits have found, for shading.
@@ -198,10 +216,14 @@ typedef struct LightOfHits {
   ISO_GLOBAL const uchar *open_counts;
   uint num_ambient;  ///< ambient rays of a hit; 0: there are none, and all is open
   uint num_shadow;   ///< shadow rays of a hit; 0: there are none, and all is lit
-  /// [ray] sums of the light that ambient rays bring from the surface (bounce.h)
+  /// [ray] sums of the light that ambient rays bring from surfaces (bounce.h): BouncedLight::own;
+  /// of layers [4][ray]: BouncedLight
   ISO_GLOBAL const float *bounced;
   uint num_bounced;  ///< rays in a sum; 0: there are none
+  uint has_colors;   ///< 0 or 1: of layers
 } LightOfHits;
+
+#define ISO_LAYER_SUMS 4u  ///< of bounced light of each ray, in frames of layers
 
 /// The share of a hit's light rays that met nothing.
 ///
@@ -210,9 +232,55 @@ ISO_INLINE float open_share(ISO_GLOBAL const uchar *open_counts, uint place, uin
   return num_rays == 0 ? 1.0f : (float)open_counts[place] / (float)num_rays;
 }
 
-/// The share of the scene's light that comes to a ray's hit by way of another place.
-ISO_INLINE float bounced_share(const LightOfHits *light, uint ray_id) {
-  return light->num_bounced == 0 ? 0.0f : light->bounced[ray_id] / (float)light->num_bounced;
+/// A hit's sums of bounced light in frames of layers.
+///
+/// sums      [ISO_LAYER_SUMS][ray] see LightOfHits
+/// num_rays  of the frame
+ISO_INLINE BouncedLight bounced_sum(ISO_GLOBAL const float *sums, uint num_rays, uint ray_id) {
+  BouncedLight sum;
+  sum.own = sums[ray_id];
+  sum.r = sums[num_rays + ray_id];
+  sum.g = sums[2 * num_rays + ray_id];
+  sum.b = sums[3 * num_rays + ray_id];
+  return sum;
+}
+
+/// The sums with what a ray brings.
+///
+/// sent_on  the share of each that the surface has sent on
+ISO_INLINE BouncedLight sum_with(BouncedLight sum, float brings, BouncedLight sent_on) {
+  sum.own = fma(brings, sent_on.own, sum.own);
+  sum.r = fma(brings, sent_on.r, sum.r);
+  sum.g = fma(brings, sent_on.g, sum.g);
+  sum.b = fma(brings, sent_on.b, sum.b);
+  return sum;
+}
+
+/// The shares of sums of that many rays.
+ISO_INLINE BouncedLight share_of_sum(BouncedLight sum, uint num_bounced) {
+  sum.own /= (float)num_bounced;
+  sum.r /= (float)num_bounced;
+  sum.g /= (float)num_bounced;
+  sum.b /= (float)num_bounced;
+  return sum;
+}
+
+/// The light of a ray's hit.
+///
+/// num_rays  of the frame
+ISO_INLINE HitLight light_of_hit(const LightOfHits *light, uint num_rays, uint ray_id) {
+  HitLight of_hit;
+  of_hit.open = open_share(light->open_counts, ray_id, light->num_ambient);
+  of_hit.lit = open_share(light->open_counts, num_rays + ray_id, light->num_shadow);
+  of_hit.bounced = nothing_bounced();
+  if (light->num_bounced == 0) return of_hit;
+  if (light->has_colors) {
+    of_hit.bounced =
+        share_of_sum(bounced_sum(light->bounced, num_rays, ray_id), light->num_bounced);
+  } else {
+    of_hit.bounced.own = light->bounced[ray_id] / (float)light->num_bounced;
+  }
+  return of_hit;
 }
 
 /// RGBA of the pixel at a column and row of the picture, 8 bits each, red in bits 0..7. The pixel
@@ -245,9 +313,7 @@ ISO_INLINE uint shade_pixel(const FrameParams *frame, const ShadeParams *p,
       color = shade_ray(frame, p,
                         surface_color(frame, p, color_map, ray_id, hits[ray_id].t, value, own),
                         ray_id, hits[ray_id].grad_x, hits[ray_id].grad_y, hits[ray_id].grad_z,
-                        open_share(light->open_counts, ray_id, light->num_ambient),
-                        open_share(light->open_counts, frame_rays + ray_id, light->num_shadow),
-                        bounced_share(light, ray_id));
+                        light_of_hit(light, frame_rays, ray_id));
       ++num_hits;
     }
     r += color.r;

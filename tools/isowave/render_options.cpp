@@ -136,7 +136,7 @@ void check_slice_options(const CLI::App &command, const RenderArgs &options) {
   if (num_surfaces + num_slices > ISO_MAX_SURFACES)
     throw Error("{} surfaces and {} slices are more than a frame can have: give at most {}",
                 num_surfaces, num_slices, ISO_MAX_SURFACES);
-  refuse_options(command, {"--voxel-pixels", "--max-image-error", "--time-budget", "--bounce"},
+  refuse_options(command, {"--voxel-pixels", "--max-image-error", "--time-budget"},
                  "--slice draws without it: leave out either");
   if (options.renderer_flags.pipeline == "blocks")
     refuse_options(command, {"--slice"}, "--pipeline blocks draws one opaque surface");
@@ -146,7 +146,7 @@ void check_slice_options(const CLI::App &command, const RenderArgs &options) {
 
 /// Ambient and shadow rays of several surfaces end at opaque ones.
 void check_light_rays(const RenderArgs &options) {
-  if (options.ambient_rays != 0 || options.light.shadow_rays != 0)
+  if (options.ambient_rays != 0 || options.light.shadow_rays != 0 || options.light.bounce_rays != 0)
     check_some_are_opaque(options.surfaces);
 }
 
@@ -160,7 +160,7 @@ void check_label_options(const CLI::App &command, const RenderArgs &options, con
   refuse_options(command,
                  {"--voxel-pixels", "--voxel-error", "--max-surface-error", "--max-image-error",
                   "--time-budget", "--slice", "--reference", "--rate", "--tolerance",
-                  "--tolerance-relative", "--no-data", "--bounce"},
+                  "--tolerance-relative", "--no-data"},
                  "labels are drawn without it: leave it out");
   check_light_rays(options);
   if (!options.slices.empty()) throw Error("labels are drawn without slices");
@@ -180,7 +180,7 @@ void check_surface_options(const CLI::App &command, const RenderArgs &options, c
   refuse_options(command, {"--isovalue"},
                  "draws pictures of one surface each, --surface one of all: leave out either");
   refuse_options(command, {"--color"}, "surfaces have colours of their own: --surface VALUE,COLOR");
-  refuse_options(command, {"--voxel-pixels", "--max-image-error", "--time-budget", "--bounce"},
+  refuse_options(command, {"--voxel-pixels", "--max-image-error", "--time-budget"},
                  "--surface draws without it: leave it out, or draw one surface by --isovalue");
   check_light_rays(options);
   if (options.renderer_flags.pipeline == "blocks")

@@ -89,8 +89,8 @@ void add_light_options(CLI::App &command, LightOptions &options) {
       ->needs(light);
   command
       .add_option("--bounce", options.bounce_rays,
-                  "rays of each hit that bring light from other places of the surface, as a matt "
-                  "surface sends it on: 16 and more. They are its ambient rays, too. Each takes "
+                  "rays of each hit that bring light from other places of opaque surfaces, as matt "
+                  "surfaces send it on: 16 and more. They are its ambient rays, too. Each takes "
                   "about as long as two frames without any")
       ->check(CLI::Range(1u, ISO_MAX_AMBIENT_RAYS))
       ->needs(light);

@@ -59,9 +59,9 @@ struct Appearance {
   /// frame without any. Needs with_rays, and a surface of opacity 1.
   std::uint32_t shadow_rays = 0;
   /// Least number of ambient rays, up to 255, if that light bounces: each hit then gets light that
-  /// comes by way of one other place of the surface, which has the surface's colour once more. Each
-  /// takes up to twice the time of an ambient ray. 0: it does not bounce. Needs with_bounce. Not
-  /// with surfaces and slices, nor in a team.
+  /// comes by way of one other place of a surface, and has that surface's colour. A surface that a
+  /// colour map colours counts as one of the hit's own colour. Each takes up to twice the time of
+  /// an ambient ray. 0: it does not bounce. Needs with_bounce, and a surface of opacity 1.
   std::uint32_t bounce_rays = 0;
   /// Half of the angle that the light has in soft shadows [degrees], up to 45.
   double light_angle = 3;
@@ -173,8 +173,8 @@ struct FrameRequest {
   /// back: what lies behind translucent surfaces is seen through them. At most 16 crossings of a
   /// ray are drawn (FrameStatistics::rays_cut). Empty: the surface of `isovalue` alone, opaque, in
   /// appearance.surface. A device needs RendererOptions::with_surfaces. Not with bound,
-  /// voxel_pixels, bounce_rays, max_image_error and time_budget_ms; in a team, nor with on_pass.
-  /// Errors are those of a ray's first hit, whatever its opacity; labels and slices have none.
+  /// voxel_pixels, max_image_error and time_budget_ms; in a team, nor with on_pass. Errors are
+  /// those of a ray's first hit, whatever its opacity; labels and slices have none.
   std::vector<Surface> surfaces{};
   /// Slices beside `surfaces`, or beside that of `isovalue`: up to 8 with the surfaces, blended
   /// with them, with their conditions. A slice counts as a crossing, is in front of a surface at

@@ -28,7 +28,8 @@ struct RendererOptions {
   bool with_bounds = false;       ///< frames may ask for bounds and max_surface_error
   bool with_time_budget = false;  ///< frames may have a time budget
   bool with_rays = false;         ///< frames may have ambient rays, and cast_rays() may be called
-  bool with_bounce = false;       ///< the same, and bounce_rays; 8 bytes a ray on a device
+  /// The same as with_rays, and bounce_rays; 8 bytes a ray on a device, 68 with with_surfaces.
+  bool with_bounce = false;
   /// Most FrameRequest::surfaces of a frame, 0 to 8. On a device, each takes 36 bytes a ray.
   std::uint32_t with_surfaces = 0;
   /// The volume is a segmentation: voxels are labels, exact integers from 0 to 65,535, and frames

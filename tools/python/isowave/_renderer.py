@@ -324,9 +324,8 @@ class Renderer:
             frame without any. Needs rays=True.
         bounce_rays
             Least number of ambient rays, up to 255, if that light bounces: each hit then gets light
-            of it by way of one other place of the surface. 16 and more give smooth pictures. Each
-            takes up to twice the time of an ambient ray. Needs bounce=True; not with surfaces and
-            slices, nor of bricks.
+            of it by way of one other place of a surface of opacity 1. 16 and more give smooth
+            pictures. Each takes up to twice the time of an ambient ray. Needs bounce=True.
         transparent
             Draws `rgba` instead of `rgb`, without a background: see Image.rgba.
         normals

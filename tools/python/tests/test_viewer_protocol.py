@@ -175,8 +175,6 @@ BAD_WISHES: list[tuple[dict[str, Any], str]] = [
     ({"bounce": 16}, "bounce needs a light"),
     ({**LIT, "bounce": 256}, "bounce must be an integer from 0 to 255"),
     ({**LIT, "bounce": None}, "bounce must be an integer"),
-    ({**PLAIN, **LIT, "bounce": 1, "slices": [SLICE]}, "bounce is for one opaque surface"),
-    ({**PLAIN, **LIT, "bounce": 1, "surfaces": 2 * [OPAQUE]}, "bounce is for one opaque surface"),
     ({"surfaces": SURFACE}, "surfaces must be a list of at most 8 surfaces"),
     ({**PLAIN, "surfaces": 9 * [SURFACE]}, "surfaces must be a list of at most 8 surfaces"),
     ({**PLAIN, "surfaces": [80]}, "a surface must have isovalue, color and opacity"),

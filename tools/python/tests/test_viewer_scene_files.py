@@ -308,7 +308,7 @@ def test_shadows_need_a_light_that_stays(open_page: Callable[..., Any]) -> None:
         assert not page.problems
 
 
-def test_light_bounces_if_it_stays_and_the_surface_is_alone(
+def test_light_bounces_if_it_stays_and_a_surface_is_opaque(
     open_page: Callable[..., Any],  # noqa: F811
 ) -> None:
     volume = FakeVolume()
@@ -331,7 +331,7 @@ def test_light_bounces_if_it_stays_and_the_surface_is_alone(
         open_scene(page, text.replace('"bounce_rays": 16', '"bounce_rays": 40'))
         assert asked(page, volume).bounce_rays == 40 and state(page)["bounce"] == "40"
         page.locator("[name=add]").click()
-        assert asked(page, volume).bounce_rays == 0 and bounce.is_disabled()
+        assert asked(page, volume).bounce_rays == 40 and bounce.is_enabled()
         assert not page.problems
 
 

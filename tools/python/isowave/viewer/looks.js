@@ -32,12 +32,12 @@ const LOOK_ROWS = `
     <label title="Whether the light above turns with the view, or stays where it is now">Light
       <select name="light"><option value="">turns</option><option value="stays">stays</option>
       </select></label>
-    <label title="Shadows of one opaque surface, in a light that stays">Shadows
+    <label title="Shadows of opaque surfaces, in a light that stays">Shadows
       <select name="shadow"><option value="">none</option>${options(SHADOWS)}</select></label>
     <label title="Half of the angle that the light has: soft shadows grow with it">Light's angle
       <span class="unit"><input name="light_angle" type="number" min="0.01" max="45" step="any"
         required> °</span></label>
-    <label title="What one opaque surface sends on to its other places, in a light that stays">
+    <label title="What opaque surfaces send on to other places, in a light that stays">
       Bounced light <input name="bounce" type="checkbox"></label>
     <label title="Colours of all surfaces: their own, or by a map">Colours
       <select name="color_map"><option value="">own</option>${choices(COLOR_MAPS)}</select></label>
@@ -86,7 +86,7 @@ export function lookOf(state, field) {
     : !(drawsLabels(state) && isByField(map));
   return { background_top: top && toRgb(top), color_map: isDrawn ? map : null, lights, light,
     shadow: hasOpaque(state) && light ? shadow : null,
-    bounce: isPlain(state) && light ? bounce : 0 };
+    bounce: hasOpaque(state) && light ? bounce : 0 };
 }
 
 /** Parts of a URL's hash. */
@@ -232,14 +232,14 @@ class Look {
     const { view } = this;
     const { color_map: map, planes: { length: count }, light, shadow, bounce } = state;
     const top = state.background_top;
-    const hasShadow = light !== null && hasOpaque(state);
+    const isLit = light !== null && hasOpaque(state);
     view.field("light").value = light ? "stays" : "";
     view.field("shadow").value = !shadow ? "" : shadow.rays === 1 ? "1" : "16";
-    view.field("shadow").disabled = !hasShadow;
+    view.field("shadow").disabled = !isLit;
     view.set("light_angle", shadow?.angle ?? LIGHT_ANGLE);
-    view.field("light_angle").disabled = !hasShadow || !(shadow?.rays > 1);
+    view.field("light_angle").disabled = !isLit || !(shadow?.rays > 1);
     view.field("bounce").checked = bounce > 0;
-    view.field("bounce").disabled = light === null || !isPlain(state);
+    view.field("bounce").disabled = !isLit;
     view.field("color_map").value = map?.colors ?? "";
     const isOffered = { caps: this.field, labels: hasLabelColors(state, this.field),
       field: this.field && this.field.name !== "volume" }; // a surface has one value of its volume

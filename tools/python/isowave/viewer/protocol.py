@@ -30,10 +30,10 @@ and then samples are the most rays of a pixel that may be chosen.
 
 Without surfaces, one opaque surface is drawn, of the wish's isovalue and color. Surfaces come in
 place of these. Surfaces and slices come without time_budget and max_error by picture, labels
-without any max_error; surfaces and slices are 8 at most together. Ambient rays and shadow need a
-surface of opacity 1. bounce needs a light, and neither surfaces nor slices. Surfaces are those of
-isovalues, or of labels without slices and colours by the field's values. step is that of a series;
-0 for a volume. The annotations' title is the volume's name if it is empty.
+without any max_error; surfaces and slices are 8 at most together. Ambient rays, shadow and bounce
+need a surface of opacity 1. bounce needs a light. Surfaces are those of isovalues, or of labels
+without slices and colours by the field's values. step is that of a series; 0 for a volume. The
+annotations' title is the volume's name if it is empty.
 
 Answers are dicts with a "type": welcome, status, histogram, picture (with bytes), bounds, scene,
 error; view.js describes them.
@@ -398,8 +398,6 @@ def _bounce(content: dict[str, Any]) -> int:
     rays = _integer(content["bounce"], 0, MAX_AMBIENT, "bounce")
     if rays and content["light"] is None:
         raise ProtocolError("bounce needs a light")
-    if rays and (content["surfaces"] or content["slices"]):
-        raise ProtocolError("bounce is for one opaque surface without slices")
     return rays
 
 
