@@ -112,6 +112,29 @@ TEST(ApiSurfaces, TheHostDrawsTheTwinsFrames) {
   }
 }
 
+/// The error of the first crossing.
+TEST(ApiSurfaces, HaveBoundsOfTheirError) {
+  const auto volume = sphere({.rate = 20, .measure_error = true});
+  Renderer twin = make_twin(volume), host = make_host_renderer(volume);
+  FrameRequest request = spheres(twin);
+  request.want_bounds = true;
+  const Frame frame = host.render(request);
+  EXPECT_EQ(frame.bounds.to_vector(), twin.render(request).bounds.to_vector());
+  request.surfaces.erase(request.surfaces.begin());  // the inner one
+  EXPECT_EQ(frame.bounds.to_vector(), host.render(request).bounds.to_vector());
+  EXPECT_GT(std::ranges::count_if(frame.bounds, [](float b) { return b > 0 && b < 1; }), 100);
+  request = spheres(twin);
+  request.max_surface_error = 2;
+  for (const Evidence by : {Evidence::kProof, Evidence::kSample}) {
+    request.by = by;
+    EXPECT_TRUE(host.can_draw(request));
+    const Frame chosen = host.render(request);
+    EXPECT_TRUE(chosen.detail.value().reachable);
+    EXPECT_EQ(chosen.detail->voxel_pixels, 0);
+    EXPECT_EQ(chosen.statistics.layers, 2u);
+  }
+}
+
 class ApiSurfacesOnDevice : public testing::TestWithParam<core::ocl::DeviceInfo> {
  protected:
   std::shared_ptr<Device> device_ = open_device(std::to_string(GetParam().index));
@@ -177,8 +200,14 @@ TEST(ApiSurfaces, BadRequestsAreOneLine) {
   });
   refuse("leave out max_surface_error", [](Request &r) { r.max_surface_error = 1; });
   refuse("leave out time_budget_ms", [](Request &r) { r.time_budget_ms = 1; });
-  refuse("errors are bounded of one opaque surface: leave out surfaces",
-         [](Request &r) { r.want_bounds = true; });
+  refuse("errors are bounded of whole surfaces: leave out clip", [](Request &r) {
+    r.want_bounds = true;
+    r.clip = {{{1, 0, 0}, 15}};
+  });
+  refuse("labels are drawn without an error: leave out want_bounds", [](Request &r) {
+    r.want_bounds = true;
+    r.surfaces = {{.labels = {1}}};
+  });
 }
 
 /// Lossless voxels are compared as if in double.

@@ -490,7 +490,9 @@ TEST_P(BrickTeamOnDevice, WithinAnError) {
       {{.camera = far, .isovalue = 0.5f}, 3},
       {{.camera = inside, .isovalue = 0.5f}, 2},
       {{.camera = at_face, .isovalue = 0.35f}, 1e-6},
-      {{.camera = far, .isovalue = 0.5f}, 3, Evidence::kSample}};
+      {{.camera = far, .isovalue = 0.5f}, 3, Evidence::kSample},
+      {{.camera = far, .surfaces = {{0.5f}, {0.4f, {}, 0.5f}}, .slices = {{{{{1, 0, 0}, 40}}}}}, 1},
+      {{.camera = inside, .surfaces = {{0.5f}, {0.7f}}}, 1, Evidence::kSample}};
   double most_pixels = 0, most_error = 0;
   std::uint64_t num_uncertain = 0;
   for (const bool is_bounded : {false, true}) {
@@ -498,7 +500,8 @@ TEST_P(BrickTeamOnDevice, WithinAnError) {
     CompressOptions how{.rate = 20, .measure_error = true, .levels = 0};
     if (is_bounded) how.precision = BlockPrecision{.min_exponent = -6};
     const CompressedVolume volume = compress(reader, how);
-    RendererOptions options{.size = kFrame, .with_levels = true, .with_bounds = true};
+    RendererOptions options{
+        .size = kFrame, .with_levels = true, .with_bounds = true, .max_surfaces = 2};
     std::vector<BoundedFrame> expected;
     {
       ocl::Device device(GetParam());

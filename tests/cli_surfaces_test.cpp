@@ -131,6 +131,30 @@ TEST_F(CliSurfaces, AllRenderersDrawTheSameBits) {
   }
 }
 
+/// By proof and by sample; bit planes are chosen, and levels of detail are not made.
+TEST_F(CliSurfaces, WithinAnError) {
+  const std::string scene =
+      "generate:gyroid_33x33x33_float32 --rate 20 --size 48x36 --surface 0.2,,0.4 --surface 0.6 "
+      "--slice z --max-surface-error 0.5 --stats " +
+      in("s.json") + " -o " + in("a.png");
+  std::array<std::string, 2> maps;
+  for (std::size_t i = 0; i < 2; ++i) {
+    const auto result = render(scene + (i == 0 ? " --device host" : " --device cpu") +
+                               " --error-map " + in("e.npy"));
+    const json error = stats()["frames"][0]["error"];
+    EXPECT_EQ(error["by"], "proof");
+    EXPECT_GT(error["certified"], 500);
+    EXPECT_GT(error["chosen"]["voxel_error"], 0);
+    EXPECT_EQ(error["chosen"]["voxel_pixels"], 0);
+    EXPECT_THAT(result.out, HasSubstr("  within 0.5 pixels of the true surface: "));
+    maps[i] = test::read_file(folder_ / "e.npy") + test::read_file(folder_ / "a.png");
+  }
+  EXPECT_EQ(maps[0], maps[1]);
+  render(scene + " --by sample --device host");
+  EXPECT_GT(stats()["frames"][0]["error"]["lowest_share"], 0.99);
+  expect_one_line_error("render " + scene + " --clip z", "is proven of whole surfaces");
+}
+
 TEST_F(CliSurfaces, PicturesAfterEachPassEndWithTheWholeOne) {
   for (const std::string renderer : {"--device host", "--device cpu"}) {
     render(kSphere + "--size 48x36 --surface 0.5,,0.4 --surface 0.7 " + renderer + " -o " +
@@ -226,9 +250,7 @@ TEST(CliSurfaceOptions, WhatDrawsOneSurfaceRefusesThem) {
   const std::string render = "render " + kSphere + "--size 16x12 --surface 0.5,,0.5 ";
   expect_one_line_error(render + "-i 0.5", "--isovalue: draws pictures of one surface each");
   expect_one_line_error(render + "--color red", "--color: surfaces have colours of their own");
-  for (const char *option :
-       {"--voxel-pixels 1", "--max-surface-error 1", "--max-surface-error 1 --by sample",
-        "--max-image-error 0.1", "--time-budget 9"})
+  for (const char *option : {"--voxel-pixels 1", "--max-image-error 0.1", "--time-budget 9"})
     expect_one_line_error(render + option, "--surface draws without it: leave it out");
   for (const char *option : {"--ambient 2", "--light 1,0,0 --shadow 1", "--light 1,0,0 --bounce 1"})
     expect_one_line_error(render + option, "end at surfaces of opacity 1, and there is none");

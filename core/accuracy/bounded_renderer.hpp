@@ -46,6 +46,8 @@ class BoundedRenderer : public RendererAround {
   struct SeriesKey {
     std::vector<Camera> series;
     float isovalue;
+    std::vector<std::pair<float, bool>> surfaces;  ///< isovalue, clipped
+    std::vector<std::pair<ClipPlane, bool>> slices;
     Clip clip;
     ImageSize size;
     std::optional<double> surface_error, image_error;
@@ -69,14 +71,20 @@ class BoundedRenderer : public RendererAround {
 
   DetailChoice choice_for(const FrameRequest &request) {
     if (request.series.empty()) return choose(request);
-    const SeriesKey key{request.series,
-                        request.isovalue,
-                        request.clip,
-                        size_of(request, abilities()),
-                        request.max_surface_error,
-                        request.max_image_error,
-                        request.by,
-                        look_of(request)};
+    SeriesKey key{request.series,
+                  request.isovalue,
+                  {},
+                  {},
+                  request.clip,
+                  size_of(request, abilities()),
+                  request.max_surface_error,
+                  request.max_image_error,
+                  request.by,
+                  look_of(request)};
+    for (const SurfaceStyle &surface : request.surfaces)
+      key.surfaces.emplace_back(surface.isovalue, surface.clipped);
+    for (const Slice &slice : request.slices.planes)
+      key.slices.emplace_back(slice.plane, slice.clipped);
     if (key == of_series_) {
       choice_.total_ms = 0;
     } else {

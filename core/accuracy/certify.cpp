@@ -10,10 +10,12 @@
 #include "core/base/error.hpp"
 #include "core/base/ms_since.hpp"
 #include "core/base/parallel_for.hpp"
+#include "core/frame/surfaces.hpp"
 #include "core/view/detail.hpp"
 #include "core/zfp/level_bounds.hpp"
 #include "kernels_cl/portable/block_cells.h"
 #include "kernels_cl/portable/cell_intersect.h"
+#include "kernels_cl/portable/layers.h"
 #include "kernels_cl/portable/zfp_codec.h"
 
 namespace isowave::core {
@@ -25,6 +27,10 @@ constexpr float kNotCertain = std::numeric_limits<float>::infinity();
 /// each half an ulp of itself, and eight roundings of the ray's length in the cell (two of the step
 /// between its faces, one of the sum, and those of the root, ISO_ROOT_STEP).
 constexpr double kDistanceRounding = 2 * 0x1p-24, kCellRounding = 2 * 0x1p-21;
+/// The part of a slice's t that rounding may move, if the ray is along its normal: the ray's
+/// direction has 16 roundings of numbers up to 1, here and in the space of the voxels. Oblique rays
+/// lose more, by the cosine.
+constexpr double kSliceRounding = 2 * 16 * 0x1p-24;
 
 /// A level's decoded voxels, as far as this rank has them, block by block as they are asked for.
 /// Not thread-safe.
@@ -247,24 +253,163 @@ std::vector<std::uint64_t> rays_of_which(const CompressedVolume &volume, bool wi
   return bits;
 }
 
-/// How far a pixel's hit may be off [pixels], kNotCertain if it may lie beyond the ray's way.
+/// The part of a ray in which its first hit with the true surfaces is [world units]. It has none if
+/// both are infinity, and may have none if `last` is.
+struct HitRange {
+  double first = INFINITY, last = INFINITY;
+
+  /// The same for the nearer of two hits.
+  void add_other(const HitRange &other) {
+    first = std::min(first, other.first);
+    last = std::min(last, other.last);
+  }
+};
+
+/// The frames of both bounds of one surface.
+struct BoundFrames {
+  std::vector<float> lower, upper;       ///< depth of the rays, at rank 0
+  std::vector<std::uint64_t> uncertain;  ///< bit of each ray, at rank 0: they prove nothing
+
+  /// The range that they prove.
+  ///
+  /// way  of the ray through the volume
+  HitRange range(std::uint32_t ray, const std::array<double, 2> &way) const {
+    const auto [first, last] = std::minmax({double{lower[ray]}, double{upper[ray]}});
+    const bool is_uncertain = (uncertain[ray / 64] >> ray % 64 & 1) != 0;
+    if (is_uncertain || first < way[0]) return {way[0], INFINITY};
+    return {first, last > way[1] ? INFINITY : last};
+  }
+};
+
+/// The slices of a frame. They are where they are drawn, but for rounding.
+struct SlicesOfFrame {
+  SlicesOfFrame(const FrameRequest &request, const VolumeInfo &finest, const FrameParams &of)
+      : frame(of),
+        layers(
+            make_layer_params(request.surfaces, request.slices, finest, of.view, request.camera)) {}
+
+  /// Adds a ray's hits with slices. If the volume lacks voxels, the drawn hit alone is known to be
+  /// seen: that of a slice, if no surface can be there.
+  ///
+  /// drawn          the ray's drawn hit [world units]
+  /// cell_rounding  see kCellRounding
+  void add(std::uint32_t ray, bool has_gaps, double drawn, double cell_rounding,
+           HitRange &range) const {
+    const ClipParams whole{};
+    const RayOfView view = ray_of_view(&frame.view, ray);
+    for (uint slice = 0; slice < layers.slices.num_planes; ++slice) {
+      const double t = double{slice_hit(&frame, &whole, &layers, slice, ray).t};
+      if (std::isinf(t)) continue;
+      const RayAxis along = make_plane_axis(
+          &frame.view, &layers.slices, &layers.slices.planes[slice], view.u, view.v, view.length);
+      const double rounding = kSliceRounding * t / std::abs(double{along.d});
+      const bool is_drawn = t == drawn && t + rounding + cell_rounding < range.first;
+      if (!has_gaps || is_drawn) range.add_other({t - rounding, t + rounding});
+    }
+  }
+
+  const FrameParams &frame;
+  LayerParams layers;
+};
+
+/// Draws the frames of both bounds of a frame's surfaces.
+class BoundDrawer {
+ public:
+  BoundDrawer(Renderer &renderer, const CompressedVolume &volume, const FrameRequest &request,
+              ImageSize size)
+      : renderer_(renderer),
+        volume_(volume),
+        request_(without_light_rays(request)),
+        levels_(renderer.levels()),
+        frames_(make_level_frames(levels_, request.camera, size, request.isovalue,
+                                  request.voxel_pixels)),
+        coarsest_(levels_.size() - 1) {
+    request_.surfaces.clear();
+    request_.slices = {};
+    request_.field_values = false;
+    request_.normals = Normals::kCell;
+    request_.on_pass = {};
+    while (!draws(frames_[coarsest_])) --coarsest_;
+    const glm::dmat3 voxel = levels_[coarsest_].index_to_world();
+    cell_rounding_ =
+        kCellRounding * (glm::length(voxel[0]) + glm::length(voxel[1]) + glm::length(voxel[2]));
+  }
+
+  /// Surfaces share decoded blocks: all are drawn with one bound, and then with the other.
+  std::vector<BoundFrames> draw(std::span<const float> isovalues) {
+    std::vector<BoundFrames> all(isovalues.size());
+    for (std::size_t i = 0; i < all.size(); ++i)
+      all[i].lower = draw_bound(isovalues[i], FieldBound::kLower);
+    for (std::size_t i = 0; i < all.size(); ++i)
+      all[i].upper = draw_bound(isovalues[i], FieldBound::kUpper);
+    for (std::size_t i = 0; i < all.size(); ++i) find_uncertain(isovalues[i], all[i]);
+    return all;
+  }
+
+  const VolumeInfo &finest_info() const { return levels_.front(); }
+  const FrameParams &finest() const { return frames_.front(); }
+  double cell_rounding() const { return cell_rounding_; }
+  std::uint64_t decoded_blocks() const { return decoded_blocks_; }  ///< by this rank
+
+ private:
+  std::vector<float> draw_bound(float isovalue, FieldBound bound) {
+    request_.isovalue = isovalue;
+    request_.bound = bound;
+    for (const PassStats &pass : renderer_.render(request_).passes)
+      decoded_blocks_ += pass.counts.decoded_count;
+    return renderer_.depth();
+  }
+
+  void find_uncertain(float isovalue, BoundFrames &bounds) {
+    for (FrameParams &frame : frames_) frame.surface.isovalue = isovalue;
+    const NoData &no_data = volume_.no_data;
+    Team &team = renderer_.team();
+    together(team, [&] {
+      check_gaps(no_data, coarsest_);
+      bounds.uncertain =
+          rays_of_which(volume_, renderer_.abilities().levels, request_, frames_,
+                        [&](std::span<BlockValues> values, std::uint32_t ray) {
+                          if (starts_between(frames_, values, ray)) return true;
+                          if (no_data.empty()) return false;
+                          const auto [first, last] =
+                              std::minmax({double{bounds.lower[ray]}, double{bounds.upper[ray]}});
+                          return is_uncertain_beside_gaps(frames_[0], no_data, values[0], ray,
+                                                          {first, last}, cell_rounding_);
+                        });
+    });
+    const auto [make, take] = in_place(bounds.uncertain);
+    team.reduce(bounds.uncertain.size(), Reduction::kOr, Receiver::kRank0, make, take);
+  }
+
+  Renderer &renderer_;
+  const CompressedVolume &volume_;
+  FrameRequest request_;
+  std::vector<VolumeInfo> levels_;
+  std::vector<FrameParams> frames_;
+  std::size_t coarsest_;  ///< level that draws
+  double cell_rounding_ = 0;
+  std::uint64_t decoded_blocks_ = 0;
+};
+
+/// How far a drawn hit may be off [pixels], kNotCertain if the true one has no range.
 ///
-/// t            drawn
-/// first, last  between those of the two frames, the true one is
-/// way          of the ray through the volume
-float bound_of_hit(double t, double first, double last, const std::array<double, 2> &way,
-                   double cell_rounding, double pixel_size) {
-  if (first < way[0] || last > way[1]) return kNotCertain;
-  const double rounding = kDistanceRounding * last + cell_rounding;
-  const double distance = std::max(t - first, last - t) + rounding;
+/// t  drawn
+float bound_of_hit(double t, const HitRange &range, double cell_rounding, double pixel_size) {
+  if (std::isinf(t) && std::isinf(range.first)) return 0;
+  if (std::isinf(t) || std::isinf(range.last)) return kNotCertain;
+  const double rounding = kDistanceRounding * range.last + cell_rounding;
+  const double distance = std::max(t - range.first, range.last - t) + rounding;
   return std::nextafter(static_cast<float>(distance / pixel_size), kNotCertain);
 }
 
-}  // namespace
+/// The isovalues of a frame's surfaces.
+std::vector<float> isovalues_of(const FrameRequest &request) {
+  return request.surfaces.empty() ? std::vector{request.isovalue}
+                                  : isovalues_of_layers(request.surfaces);
+}
 
-Certificate certify(Renderer &renderer, const CompressedVolume &volume, const FrameRequest &request,
-                    std::span<const float> drawn) {
-  const auto begin = std::chrono::steady_clock::now();
+/// Throws  Error, at all ranks
+void check_drawn(Renderer &renderer, const FrameRequest &request, std::span<const float> drawn) {
   const Abilities abilities = renderer.abilities();
   if (!finds_all(abilities.solver)) {
     throw Error(
@@ -273,70 +418,49 @@ Certificate certify(Renderer &renderer, const CompressedVolume &volume, const Fr
         to_string(abilities.solver));
   }
   check(request, abilities);
-  const ImageSize size = size_of(request, abilities);
-  Team &team = renderer.team();
-  const bool is_first = team.rank() == 0;
-  together(team, [&] {
-    if (is_first && drawn.size() != size.num_rays())
-      throw Error("{} hits are not those of {} rays", drawn.size(), size.num_rays());
+  if (!request.surfaces.empty() && !request.surfaces.front().labels.empty())
+    throw Error("labels are drawn without an error: it has no bound");
+  together(renderer.team(), [&] {
+    const std::uint64_t num_rays = size_of(request, abilities).num_rays();
+    if (renderer.team().rank() == 0 && drawn.size() != num_rays)
+      throw Error("{} hits are not those of {} rays", drawn.size(), num_rays);
   });
-  Certificate certificate;
-  std::uint64_t decoded_blocks = 0;
-  const auto draw = [&](FieldBound bound) {
-    FrameRequest of_bound = without_light_rays(request);
-    of_bound.normals = Normals::kCell;
-    of_bound.bound = bound;
-    of_bound.field_values = false;
-    of_bound.on_pass = {};
-    for (const PassStats &pass : renderer.render(of_bound).passes)
-      decoded_blocks += pass.counts.decoded_count;
-    return renderer.depth();
-  };
-  const std::vector<float> lower = draw(FieldBound::kLower), upper = draw(FieldBound::kUpper);
-  for (const std::uint64_t of_rank : gather(team, std::vector{decoded_blocks}))
-    certificate.decoded_blocks += of_rank;
+}
 
-  const std::vector<VolumeInfo> levels = renderer.levels();
-  const std::vector<FrameParams> level_frames =
-      make_level_frames(levels, request.camera, size, request.isovalue, request.voxel_pixels);
-  std::size_t coarsest = levels.size() - 1;
-  while (!draws(level_frames[coarsest])) --coarsest;
-  const glm::dmat3 voxel = levels[coarsest].index_to_world();
-  const double cell_rounding =
-      kCellRounding * (glm::length(voxel[0]) + glm::length(voxel[1]) + glm::length(voxel[2]));
-  const NoData &no_data = volume.no_data;
-  std::vector<std::uint64_t> uncertain;
-  together(team, [&] {
-    check_gaps(no_data, coarsest);
-    uncertain = rays_of_which(
-        volume, abilities.levels, request, level_frames,
-        [&](std::span<BlockValues> values, std::uint32_t ray) {
-          if (starts_between(level_frames, values, ray)) return true;
-          if (no_data.empty()) return false;
-          const auto [first, last] = std::minmax({double{lower[ray]}, double{upper[ray]}});
-          return is_uncertain_beside_gaps(level_frames[0], no_data, values[0], ray, {first, last},
-                                          cell_rounding);
-        });
-  });
-  const auto [make, take] = in_place(uncertain);
-  team.reduce(uncertain.size(), Reduction::kOr, Receiver::kRank0, make, take);
-  if (!is_first) return certificate;
-
-  certificate.bounds.assign(drawn.size(), kNotCertain);
+/// Calls work(ray) for all rays of a frame.
+template <class Work>
+void for_rays(ImageSize size, const Work &work) {
   parallel_for(size.ray_rows(), 0, [&](std::uint64_t row, std::uint32_t) {
     const auto first = static_cast<std::uint32_t>(row * size.ray_columns());
-    for (std::uint32_t pixel = first; pixel < first + size.ray_columns(); ++pixel) {
-      if ((uncertain[pixel / 64] >> pixel % 64 & 1) != 0) continue;
-      const double t = double{drawn[pixel]};
-      const auto [first_t, last_t] = std::minmax({double{lower[pixel]}, double{upper[pixel]}});
-      float &bound = certificate.bounds[pixel];
-      if (std::isinf(t) && std::isinf(first_t)) {
-        bound = 0;
-      } else if (std::isfinite(t) && std::isfinite(last_t)) {
-        bound = bound_of_hit(t, first_t, last_t, way_through(level_frames[0], pixel), cell_rounding,
-                             pixel_size_at(request.camera, size.height, t));
-      }
-    }
+    for (std::uint32_t ray = first; ray < first + size.ray_columns(); ++ray) work(ray);
+  });
+}
+
+}  // namespace
+
+Certificate certify(Renderer &renderer, const CompressedVolume &volume, const FrameRequest &request,
+                    std::span<const float> drawn) {
+  const auto begin = std::chrono::steady_clock::now();
+  check_drawn(renderer, request, drawn);
+  const ImageSize size = size_of(request, renderer.abilities());
+  Team &team = renderer.team();
+  BoundDrawer drawer(renderer, volume, request, size);
+  const std::vector<BoundFrames> surfaces = drawer.draw(isovalues_of(request));
+  Certificate certificate;
+  for (const std::uint64_t of_rank : gather(team, std::vector{drawer.decoded_blocks()}))
+    certificate.decoded_blocks += of_rank;
+  if (team.rank() != 0) return certificate;
+  const FrameParams &finest = drawer.finest();
+  const SlicesOfFrame slices(request, drawer.finest_info(), finest);
+  certificate.bounds.assign(drawn.size(), kNotCertain);
+  for_rays(size, [&](std::uint32_t ray) {
+    const double t = double{drawn[ray]};
+    const std::array<double, 2> way = way_through(finest, ray);
+    HitRange range;
+    for (const BoundFrames &surface : surfaces) range.add_other(surface.range(ray, way));
+    slices.add(ray, !volume.no_data.empty(), t, drawer.cell_rounding(), range);
+    certificate.bounds[ray] = bound_of_hit(t, range, drawer.cell_rounding(),
+                                           pixel_size_at(request.camera, size.height, t));
   });
   certificate.total_ms = ms_since(begin);
   return certificate;

@@ -80,6 +80,17 @@ void advise(const CompressedVolume &volume, double error, double max_surface_err
   }
 }
 
+/// The request for hits alone: rays end at the first, also on what is translucent.
+FrameRequest of_first_hits(FrameRequest request) {
+  request = without_light_rays(std::move(request));
+  request.normals = Normals::kCell;
+  request.field_values = false;
+  request.on_pass = {};
+  for (SurfaceStyle &surface : request.surfaces) surface.opacity = 1;
+  for (Slice &slice : request.slices.planes) slice.opacity = 1;
+  return request;
+}
+
 /// Draws a sample of the rays of some views with one detail after another, and judges each.
 class Judge {
  public:
@@ -88,16 +99,13 @@ class Judge {
         double max_surface_error, Evidence by, std::span<const Camera> series)
       : renderer_(renderer),
         volume_(volume),
-        request_(without_light_rays(request)),
+        request_(of_first_hits(request)),
         views_(views_of(request.camera, series)),
         levels_(renderer.levels()),
         size_(sample_of(size_of(request, renderer.abilities()))),
         max_surface_error_(max_surface_error),
         by_(by) {
-    request_.normals = Normals::kCell;
     request_.size = size_;
-    request_.field_values = false;
-    request_.on_pass = {};
     const View view = make_view(levels_.front(), request.camera, size_);
     for (std::uint32_t ray = 0; ray < size_.num_rays(); ++ray) {
       if (!is_in_picture(view, size_, ray)) beside_.push_back(ray);
@@ -229,8 +237,9 @@ DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, d
         numbers, [&](double number) { return !judge.keeps(detail_of(number)); });
     return found == numbers.end() ? 0.0 : *found;
   };
-  // Beside voxels without data, coarser levels have no bound.
-  if (choice.reachable && abilities.levels && levels.size() > 1 &&
+  // Beside voxels without data, coarser levels have no bound. Several surfaces have the finest
+  // alone.
+  if (choice.reachable && abilities.levels && levels.size() > 1 && request.surfaces.empty() &&
       (by_sample || volume.no_data.empty())) {
     const double coarsest = first_to_suffice(all_voxel_pixels(), [](double voxel_pixels) {
       return Detail{voxel_pixels, 0};

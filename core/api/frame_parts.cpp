@@ -261,9 +261,8 @@ void check_wanted(const FrameRequest &request, const core::Abilities &abilities)
     throw core::Error("the surface of a bound has no error: draw the volume itself");
   if (!request.clip.empty())
     throw core::Error("errors are bounded of whole surfaces: leave out clip, or want_bounds");
-  if (!request.surfaces.empty() || !request.slices.empty())
-    throw core::Error(
-        "errors are bounded of one opaque surface: leave out surfaces and slices, or want_bounds");
+  if (!labels_of(request.surfaces).empty())
+    throw core::Error("labels are drawn without an error: leave out want_bounds");
   if (!abilities.bounds) {
     throw core::Error(
         "this renderer knows no bounds of the error: leave out want_bounds, or draw on the host, "

@@ -68,7 +68,7 @@ bool exceeds_host(const RenderArgs &options, const Drawing &drawing) {
 /// Whether levels of detail are chosen among those that the volume has. Small pictures of a time
 /// budget keep the finest level on CPUs: Abilities::levels_pay.
 bool chooses_levels(const RenderArgs &options, const Drawing &drawing) {
-  return chooses_detail(options) ||
+  return chooses_levels(options) ||
          (options.time_budget && drawing.device && options.renderer_flags.pipeline != "blocks" &&
           !MarchPackets::suits(drawing.device->info()));
 }

@@ -88,6 +88,10 @@ bool chooses_detail(const RenderArgs &options) {
   return options.max_surface_error || options.max_image_error;
 }
 
+bool chooses_levels(const RenderArgs &options) {
+  return chooses_detail(options) && !draws_layers(options);
+}
+
 bool draws_bounds(const RenderArgs &options) {
   return options.max_surface_error && options.by == "proof";
 }
@@ -132,8 +136,7 @@ void check_slice_options(const CLI::App &command, const RenderArgs &options) {
   if (num_surfaces + num_slices > ISO_MAX_SURFACES)
     throw Error("{} surfaces and {} slices are more than a frame can have: give at most {}",
                 num_surfaces, num_slices, ISO_MAX_SURFACES);
-  refuse_options(command,
-                 {"--voxel-pixels", "--max-surface-error", "--max-image-error", "--time-budget"},
+  refuse_options(command, {"--voxel-pixels", "--max-image-error", "--time-budget"},
                  "--slice draws without it: leave out either");
   if (options.renderer_flags.pipeline == "blocks")
     refuse_options(command, {"--slice"}, "--pipeline blocks draws one opaque surface");
@@ -177,8 +180,7 @@ void check_surface_options(const CLI::App &command, const RenderArgs &options, c
   refuse_options(command, {"--isovalue"},
                  "draws pictures of one surface each, --surface one of all: leave out either");
   refuse_options(command, {"--color"}, "surfaces have colours of their own: --surface VALUE,COLOR");
-  refuse_options(command,
-                 {"--voxel-pixels", "--max-surface-error", "--max-image-error", "--time-budget"},
+  refuse_options(command, {"--voxel-pixels", "--max-image-error", "--time-budget"},
                  "--surface draws without it: leave it out, or draw one surface by --isovalue");
   check_light_rays(options);
   if (options.renderer_flags.pipeline == "blocks")
@@ -311,11 +313,11 @@ void check_brick_levels(const RenderArgs &options, const std::vector<VolumeInfo>
   const CompressionOptions &compression = options.frame.compression;
   const bool makes_levels =
       !is_zfp_name(options.input) &&
-      (compression.levels != 1 || (chooses_detail(options) && !says_levels(compression)));
+      (compression.levels != 1 || (chooses_levels(options) && !says_levels(compression)));
   if (options.voxel_pixels == 0 && !makes_levels) return;
   throw Error(
       "{} has no levels of detail, which bricks cannot make: isowave convert --levels all{}",
-      options.input, chooses_detail(options) ? ", or do without them: --levels 1" : "");
+      options.input, chooses_levels(options) ? ", or do without them: --levels 1" : "");
 }
 
 namespace {
@@ -439,7 +441,7 @@ void add_render_options(CLI::App &command, RenderArgs &options) {
       "--max-surface-error", options.max_surface_error,
       "largest distance to the surface of the uncompressed volume [pixels]: levels of detail and "
       "bit planes are chosen so that most pixels keep it, and the share of certain pixels is "
-      "printed; see --by");
+      "printed; see --by. With --surface or --slice, of each ray's first hit, by bit planes alone");
   command
       .add_option("--by", options.by,
                   "evidence for --max-surface-error. proof: bounds of each pixel's error. sample: "

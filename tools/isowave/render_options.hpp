@@ -92,6 +92,8 @@ bool asks_for_output(const RenderArgs &options);
 bool asks_for_picture(const RenderArgs &options);
 /// Whether an error is given, for which levels of detail are chosen.
 bool chooses_detail(const RenderArgs &options);
+/// Whether levels of detail are chosen for it: frames with layers have the finest alone.
+bool chooses_levels(const RenderArgs &options);
 /// Whether a picture is written that gets annotations.
 bool writes_annotated(const RenderArgs &options);
 /// Whether bounds of the error are drawn: for --max-surface-error, by proof.

@@ -173,7 +173,8 @@ struct FrameRequest {
   /// back: what lies behind translucent surfaces is seen through them. At most 16 crossings of a
   /// ray are drawn (FrameStatistics::rays_cut). Empty: the surface of `isovalue` alone, opaque, in
   /// appearance.surface. A device needs RendererOptions::with_surfaces. Not with bound,
-  /// voxel_pixels, max_surface_error, max_image_error, time_budget_ms and want_bounds.
+  /// voxel_pixels, max_image_error and time_budget_ms. Errors are those of a ray's first hit,
+  /// whatever its opacity; labels and slices have none.
   std::vector<Surface> surfaces{};
   /// Slices beside `surfaces`, or beside that of `isovalue`: up to 8 with the surfaces, blended
   /// with them, with their conditions. A slice counts as a crossing, is in front of a surface at

@@ -214,11 +214,12 @@ class Request:
         """Options that a renderer needs to draw this, and the argument that needs each option."""
         by_proof = self.max_error is not None and self.by == "proof"
         by_sample = self.max_error is not None and self.by == "sample"
+        of_levels = by_sample and not self.num_surfaces  # several surfaces have the finest alone
         asked = {
             "bounds": ("max_error", by_proof or "bounds" in self.outputs),
             "levels": (
                 "max_error" if by_sample else "voxel_pixels",
-                by_sample or self.voxel_pixels > 0,
+                of_levels or self.voxel_pixels > 0,
             ),
             "time_budget": ("time_budget", self.time_budget is not None),
             "labels": ("labels", self.has_labels),

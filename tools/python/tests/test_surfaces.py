@@ -47,6 +47,23 @@ def test_a_translucent_surface_is_seen_through(ball: isowave.Volume, device: str
 
 
 @pytest.mark.parametrize("device", DEVICES)
+def test_errors_are_those_of_the_first_crossing(device: str) -> None:
+    voxels = RADIUS - sphere_voxels((25, 24, 31))
+    volume = isowave.compress(voxels, rate=20, origin=(30, 20, 10))
+    options = {"camera": CAMERA, "size": SIZE, "device": device}
+    image = volume.render(surfaces=BOTH, outputs=("depth", "bounds"), max_error=0.5, **options)
+    assert image.depth is not None and image.bounds is not None
+    is_hit = np.isfinite(image.depth)
+    assert is_hit.sum() > 500 and np.mean(image.bounds[is_hit] <= 0.5) > 0.95
+    detail = image.statistics["detail"]
+    assert detail["voxel_pixels"] == 0 < detail["voxel_error"]
+    outer = volume.render(0, outputs=("bounds",), voxel_error=detail["voxel_error"], **options)
+    assert np.array_equal(image.bounds, outer.bounds)
+    sample = volume.render(surfaces=BOTH, max_error=0.5, by="sample", **options)
+    assert sample.statistics["detail"]["voxel_error"] > 0
+
+
+@pytest.mark.parametrize("device", DEVICES)
 def test_arrays_are_those_of_the_first_crossing(ball: isowave.Volume, device: str) -> None:
     renderer = ball.renderer(size=SIZE, device=device, surfaces=2)
     outputs = ("rgb", "depth", "normals", "surface", "cap")
@@ -184,9 +201,9 @@ def test_surfaces_that_cannot_be_drawn_are_refused(ball: isowave.Volume) -> None
     glass = [Surface(0, opacity=0.5), Surface(1, opacity=0.9)]
     refuse("end at surfaces of opacity 1, and there is none", glass, ambient=1)
     refuse("leave out voxel_pixels", voxel_pixels=1)
-    refuse("leave out max_surface_error", max_error=1)
+    refuse("leave out max_image_error", max_image_error=0.1)
     refuse("leave out time_budget_ms", time_budget=1)
-    refuse("errors are bounded of one opaque surface", outputs=("bounds",))
+    refuse("errors are bounded of whole surfaces", outputs=("bounds",), clip=[HALF])
     on_device = ball.renderer(size=SIZE, device="cpu", surfaces=1)
     with pytest.raises(isowave.Error, match="needs a renderer that was made with surfaces=2"):
         on_device.render(surfaces=BOTH)

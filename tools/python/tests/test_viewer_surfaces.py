@@ -57,12 +57,12 @@ def test_surfaces_are_added_changed_and_removed(
         type_into(page.get_by_label("Largest error"), "1")
         assert button(page, "Remove surface 1").is_disabled()
         assert button(page, "Show surface 1").is_disabled()
-        # Added at suggested isovalues; what cannot be had together with surfaces is left out.
+        # Added at suggested isovalues; the error is then the first hits'.
         assert changes(page, lambda: field(page, "Opacity", 1).fill("0.4"))
         button(page, "Add surface").click()
         assert asked(page, volume) == [(80, 0.4), (90.5, 0.5)]
-        assert volume.frames[-1].request.max_error is None
-        assert page.get_by_label("Largest error").is_disabled()
+        assert volume.frames[-1].request.max_error == 1
+        assert page.get_by_label("Time budget").is_disabled()
         # The slider moves the surface that is selected.
         slider = page.get_by_label("Isovalue on the histogram")
         slider.fill("150")
@@ -89,7 +89,7 @@ def test_surfaces_are_added_changed_and_removed(
             "150",
             "1",
         )
-        assert not page.get_by_label("Largest error").is_disabled()
+        assert not page.get_by_label("Time budget").is_disabled()
         assert not page.problems
 
 

@@ -174,13 +174,13 @@ class FakeRenderer:
             raise RuntimeError(f"two surfaces have the isovalue {request.isovalue:g}")
         if request.needs_field and self._options.get("field") is None:
             raise RuntimeError("the renderer was made without a field")
-        if "bounds" in request.outputs and (request.surfaces or request.slices):
-            raise RuntimeError("errors are bounded of one opaque surface")
+        if "bounds" in request.outputs and request.has_labels:
+            raise RuntimeError("labels are drawn without an error")
         image_error = request.max_image_error
-        if (request.surfaces or request.slices) and (
-            request.max_error or image_error or request.time_budget
-        ):
-            raise RuntimeError("surfaces are drawn without max_error and time_budget")
+        if request.num_surfaces and (image_error or request.time_budget):
+            raise RuntimeError("surfaces are drawn without max_image_error and time_budget")
+        if request.has_labels and request.max_error:
+            raise RuntimeError("labels are drawn without max_error")
         if image_error and (request.max_error or request.time_budget or request.voxel_pixels):
             raise RuntimeError("max_image_error chooses the detail, and is kept alone")
         if request.voxel_pixels and not self._options["levels"]:

@@ -29,10 +29,11 @@ max_error is in pixels of the surface, by proof or by sample; or, by picture, FL
 and then samples are the most rays of a pixel that may be chosen.
 
 Without surfaces, one opaque surface is drawn, of the wish's isovalue and color. Surfaces come in
-place of these. Surfaces and slices come without max_error and time_budget; together they are 8 at
-most. Ambient rays, shadow and bounce need a surface of opacity 1. bounce needs a light. Surfaces
-are those of isovalues, or of labels without slices and colours by the field's values. step is that
-of a series; 0 for a volume. The annotations' title is the volume's name if it is empty.
+place of these. Surfaces and slices come without time_budget and max_error by picture, labels
+without any max_error; surfaces and slices are 8 at most together. Ambient rays, shadow and bounce
+need a surface of opacity 1. bounce needs a light. Surfaces are those of isovalues, or of labels
+without slices and colours by the field's values. step is that of a series; 0 for a volume. The
+annotations' title is the volume's name if it is empty.
 
 Answers are dicts with a "type": welcome, status, histogram, picture (with bytes), bounds, scene,
 error; view.js describes them.
@@ -275,18 +276,25 @@ def _labels(value: object) -> tuple[int, ...]:
     return tuple(_integer(label, 0, MAX_LABEL, "a label") for label in value)
 
 
+def _refuse_quality(content: dict[str, Any], drawn: str, are_labels: bool) -> None:
+    """Refuses what pictures of several surfaces and slices do not keep."""
+    if content["time_budget"] is not None:
+        raise ProtocolError(f"{drawn} are drawn without time_budget")
+    if content["max_error"] is not None and (are_labels or content["by"] == "picture"):
+        raise ProtocolError(f"{drawn} are drawn without max_error")
+
+
 def _surfaces(content: dict[str, Any]) -> tuple[Surface, ...]:
     value = content["surfaces"]
     if not isinstance(value, list) or len(value) > MAX_SURFACES:
         raise ProtocolError(f"surfaces must be a list of at most {MAX_SURFACES} surfaces")
-    for name in ("max_error", "time_budget"):
-        if value and content[name]:
-            raise ProtocolError(f"surfaces are drawn without {name}")
     surfaces = tuple(_surface(surface) for surface in value)
     if len({bool(surface.labels) for surface in surfaces}) == 2:
         raise ProtocolError("surfaces of labels are drawn without isosurfaces")
     if surfaces and surfaces[0].labels and content["slices"]:
         raise ProtocolError("labels are drawn without slices")
+    if surfaces:
+        _refuse_quality(content, "surfaces", bool(surfaces[0].labels))
     if surfaces and all(surface.opacity < 1 for surface in surfaces):
         for name in ("ambient", "shadow"):
             if content[name]:
@@ -311,9 +319,8 @@ def _slices(content: dict[str, Any]) -> tuple[Slice, ...]:
         raise ProtocolError("slices must be a list")
     if value and count + len(value) > MAX_SURFACES:
         raise ProtocolError(f"surfaces and slices must be at most {MAX_SURFACES} together")
-    for name in ("max_error", "time_budget"):
-        if value and content[name] is not None:
-            raise ProtocolError(f"slices are drawn without {name}")
+    if value:
+        _refuse_quality(content, "slices", False)
     return tuple(_slice(each) for each in value)
 
 

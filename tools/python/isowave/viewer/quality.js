@@ -10,7 +10,6 @@ const ERRORS = {
   sample: { unit: "px", limits: [0.001, 1000] },
   picture: { unit: "FLIP", limits: [1e-6, 1] },
 };
-const OF_ONE_SURFACE = ["max_error", "by", "time_budget"]; // fields
 
 /** HTML of the panel's rows. */
 const QUALITY_ROWS = `
@@ -35,6 +34,10 @@ const QUALITY_ROWS = `
 const choosesRays = (state) =>
   isPlain(state) && state.by === "picture" && state.max_error !== null;
 
+/** @returns {boolean} whether an error is kept: of a picture, by one surface alone */
+const keepsError = (state) =>
+  isPlain(state) || (state.by !== "picture" && !drawsLabels(state));
+
 /** A State as a wish's quality. */
 export function wishedQuality(state) {
   const { by, ambient } = state;
@@ -42,7 +45,7 @@ export function wishedQuality(state) {
   return {
     samples: choosesRays(state) && state.samples === 1 ? MOST_SAMPLES : state.samples,
     by,
-    max_error: plain ? state.max_error : null,
+    max_error: keepsError(state) ? state.max_error : null,
     time_budget: plain && !isByField(state.color_map) ? state.time_budget : null,
     ambient: hasOpaque(state) ? ambient : 0,
   };
@@ -122,8 +125,9 @@ class QualityRows {
     view.find(".of_error").textContent = unit;
     view.find(".of_picture").hidden = !(plain && state.by === "picture");
     view.find(".of_samples").textContent = `${chooses ? "Most samples" : "Samples"} per pixel`;
-    for (const name of OF_ONE_SURFACE) view.field(name).disabled = !plain;
+    view.field("max_error").disabled = !keepsError(state);
+    view.field("by").disabled = drawsLabels(state);
+    view.field("time_budget").disabled = !plain || isByField(state.color_map);
     view.field("ambient").disabled = !hasOpaque(state);
-    if (isByField(state.color_map)) view.field("time_budget").disabled = true;
   }
 }

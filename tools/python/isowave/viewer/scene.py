@@ -461,9 +461,8 @@ class Scene:
         with self._changed:
             if client.wish is wish:
                 now = self._clock()
-                # Errors are bounded only of one surface, opaque and whole.
-                request = wish.request
-                is_bounded = not (request.clip or request.surfaces or request.slices)
+                # Errors are bounded only of whole surfaces; labels have none.
+                is_bounded = not (wish.request.clip or wish.request.has_labels)
                 client.stage = Stage.CERTAIN if is_bounded else Stage.DONE
                 client.due = now + CERTAIN_SECONDS
                 head = {**head, "stage": "lossless", "format": "png"}
