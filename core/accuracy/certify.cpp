@@ -283,10 +283,9 @@ Certificate certify(Renderer &renderer, const CompressedVolume &volume, const Fr
   Certificate certificate;
   std::uint64_t decoded_blocks = 0;
   const auto draw = [&](FieldBound bound) {
-    FrameRequest of_bound = without_light_rays(request);
+    FrameRequest of_bound = without_calls(without_light_rays(request));
     of_bound.normals = Normals::kCell;
     of_bound.bound = bound;
-    of_bound.on_pass = {};
     for (const PassStats &pass : renderer.render(of_bound).passes)
       decoded_blocks += pass.counts.decoded_count;
     return renderer.depth();

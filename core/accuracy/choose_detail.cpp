@@ -66,7 +66,7 @@ void advise(const CompressedVolume &volume, double error, double max_surface_err
   const std::string half =
       fmt::format("at full detail half of those with a bound are within {:.3g}", choice.median);
   if (choice.tolerance) {
-    choice.advice = fmt::format("{}; a volume converted with --tolerance {:.2g} would do", half,
+    choice.advice = fmt::format("{}; a volume compressed with a tolerance of {:.2g} would do", half,
                                 *choice.tolerance);
   } else if (error <= least) {
     choice.advice = "voxels can hardly be stored with a smaller error than these have";
@@ -88,7 +88,7 @@ class Judge {
         double max_surface_error, Evidence by, std::span<const Camera> series)
       : renderer_(renderer),
         volume_(volume),
-        request_(without_light_rays(request)),
+        request_(without_calls(without_light_rays(request))),
         views_(views_of(request.camera, series)),
         levels_(renderer.levels()),
         size_(sample_of(size_of(request, renderer.abilities()))),
@@ -96,7 +96,6 @@ class Judge {
         by_(by) {
     request_.normals = Normals::kCell;
     request_.size = size_;
-    request_.on_pass = {};
     const View view = make_view(levels_.front(), request.camera, size_);
     for (std::uint32_t ray = 0; ray < size_.num_rays(); ++ray) {
       if (!is_in_picture(view, size_, ray)) beside_.push_back(ray);
