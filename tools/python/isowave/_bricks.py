@@ -6,7 +6,7 @@ import os
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -15,11 +15,16 @@ from isowave import _core
 from isowave._camera import Camera, view_count
 from isowave._checked import Isovalue, number, size_of
 from isowave._compress import compression_options
+from isowave._handed_on import takes
 from isowave._image import Image
 from isowave._placed import Placed
-from isowave._renderer import draw, renderer_options, warn_of_isovalue
-from isowave._request import Request, isovalue_or_surfaces
+from isowave._renderer import Renderer, draw, renderer_options, warn_of_isovalue
+from isowave._report import Device
+from isowave._request import FrameArguments, Request, isovalue_or_surfaces, request_of
 from isowave._surface import Surface
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 OUTPUTS = ("rgb", "depth", "normals")
 ALL_OUTPUTS = (*OUTPUTS, "bounds", "field")
@@ -165,9 +170,9 @@ class BrickRenderer(Placed[_core.Renderer]):
                 warnings.warn(notice, RuntimeWarning, stacklevel=2)
 
     @property
-    def device(self) -> dict[str, Any]:
+    def device(self) -> Device:
         """This process's device, as Renderer.device."""
-        return self._core.device
+        return Device(self._core.device)
 
     def camera(
         self,
@@ -199,20 +204,22 @@ class BrickRenderer(Placed[_core.Renderer]):
         cameras = self._core.turntable(request.values, count, width, height, request.has_labels)
         return [Camera(*camera) for camera in cameras]
 
+    def __repr__(self) -> str:
+        (width, height), processes = self.size, self._processes
+        rank = f"rank {processes.rank} of {processes.size}"
+        return f"<isowave.BrickRenderer {width} x {height}, {rank}, {self.device['name']}>"
+
+    def __reduce__(self) -> Any:
+        raise TypeError("a BrickRenderer cannot be pickled: each process makes its own")
+
     def _checked(self, request: Request) -> Request:
         if request.has_labels and not self._has_labels:
             raise _core.Error("labels needs a renderer that was made with labels=True")
         return request
 
+    @takes(Renderer.render, without=("time_budget", "on_pass"), outputs=OUTPUTS)
     def render(
-        self,
-        isovalue: float | None = None,
-        *,
-        camera: Camera | None = None,
-        size: tuple[int, int] | None = None,
-        surfaces: Sequence[Surface] = (),
-        outputs: Sequence[str] = OUTPUTS,
-        **more: Any,
+        self, isovalue: float | None = None, **frame: Unpack[FrameArguments]
     ) -> Image | None:
         """Draws a frame; arguments as Renderer.render(), without positions, time_budget, on_pass.
 
@@ -233,14 +240,10 @@ class BrickRenderer(Placed[_core.Renderer]):
         """
 
         def ask() -> Request:
-            request = Request(
-                given_isovalue(isovalue_or_surfaces(isovalue, surfaces)),
-                camera,
-                self.size if size is None else size,
-                surfaces=surfaces,
-                outputs=outputs,
-                **more,
-            )
+            value = given_isovalue(isovalue_or_surfaces(isovalue, frame.get("surfaces", ())))
+            request = request_of(value, {"outputs": OUTPUTS, **frame})
+            if request.size is None:
+                request = replace(request, size=self.size)
             for name in request.outputs:
                 if name not in ALL_OUTPUTS:
                     raise ValueError(f"outputs {name}: bricks have {', '.join(ALL_OUTPUTS)}")
@@ -250,15 +253,17 @@ class BrickRenderer(Placed[_core.Renderer]):
             return self._checked(request)
 
         request = self._processes.together(ask)
-        if len(set(self._processes.all_gather(b"" if camera is None else b"given"))) > 1:
+        if len(set(self._processes.all_gather(b"" if request.camera is None else b"given"))) > 1:
             raise _core.Error("some processes give a camera, and others none: ask alike")
-        if camera is None:
+        if request.camera is None:
             wanted = None if request.surfaces else request.isovalue
             view = self.camera(wanted, request.size, surfaces=request.surfaces)
             request = replace(request, camera=view)
-        frame = draw(self._core, request, interrupts=False)
-        if self._processes.rank != 0:
+        is_first = self._processes.rank == 0
+        progress = request.progress if is_first else False
+        drawn = draw(self._core, request, interrupts=False, progress=progress)
+        if not is_first:
             return None
         for value in request.isovalues:
             warn_of_isovalue(self._core, value)
-        return Image(frame, request)
+        return Image(drawn, request)
