@@ -3,9 +3,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <isowave/isowave.hpp>
+#include <stdexcept>
 #include <thread>
 
 #include "tests/api_support.hpp"
@@ -155,6 +157,40 @@ TEST(ApiHostRenderer, FramesCanBeWatchedAndStopped) {
   const std::size_t half = whole.picture.size() / 2;
   EXPECT_TRUE(std::equal(whole.picture.begin(), whole.picture.begin() + std::ptrdiff_t(half),
                          stopped.picture.begin()));
+}
+
+/// One thread reports after each tile: half of the tiles are the camera's, a quarter of the work.
+TEST(ApiHostRenderer, FramesSayHowMuchIsDone) {
+  Renderer renderer = make_host_renderer(public_volume(), {.num_threads = 1});
+  FrameRequest request{
+      .camera = renderer.camera(10), .isovalue = 10, .size = {128, 96}, .ambient_rays = 3};
+  const Frame expected = renderer.render(request);
+  std::vector<double> told;
+  request.on_progress = [&](double percent) { told.push_back(percent); };
+  const Frame frame = renderer.render(request);
+  EXPECT_EQ(frame.picture, expected.picture);
+  EXPECT_EQ(frame.statistics.passes, expected.statistics.passes);
+  ASSERT_GT(told.size(), 8u);
+  EXPECT_TRUE(std::ranges::is_sorted(told));
+  EXPECT_EQ(told.back(), 100);
+  const auto of_camera = std::ranges::count_if(told, [](double percent) { return percent <= 25; });
+  EXPECT_EQ(2u * static_cast<std::size_t>(of_camera), told.size());
+
+  told.clear();
+  request.surfaces = {{.isovalue = 10, .opacity = 0.5}, {.isovalue = 60}};
+  renderer.render(request);
+  EXPECT_TRUE(std::ranges::is_sorted(told));
+  EXPECT_EQ(told.back(), 100);
+
+  told.clear();
+  request.surfaces.clear();
+  request.time_budget_ms = 1e6;
+  renderer.render(request);
+  EXPECT_TRUE(told.empty()) << "a step would be told of as the whole";
+
+  request.time_budget_ms.reset();
+  request.on_progress = [](double) { throw std::runtime_error("my own"); };
+  EXPECT_THAT(error_of([&] { renderer.render(request); }), HasSubstr("my own"));
 }
 
 TEST(ApiHostRenderer, ThreadsShareARenderer) {

@@ -250,6 +250,30 @@ TEST_P(ApiOnDevice, FramesKeepErrorsAndTimes) {
   EXPECT_EQ(stopped.picture.size(), 3u * 64 * 48);
 }
 
+TEST_P(ApiOnDevice, SmallFramesSayHowMuchIsDone) {
+  const RendererOptions options{.largest = {64, 48, 1}, .with_rays = true, .with_surfaces = 2};
+  Renderer renderer(open_device(selector()), sphere(), options);
+  FrameRequest request = small_request(renderer);
+  request.ambient_rays = 3;
+  for (const bool is_layered : {false, true}) {
+    if (is_layered) {
+      request.surfaces = {{.isovalue = request.isovalue, .opacity = 0.5},
+                          {.isovalue = request.isovalue + 1}};
+    }
+    request.on_progress = {};
+    const Frame expected = renderer.render(request);
+    std::vector<double> told;
+    request.on_progress = [&](double percent) { told.push_back(percent); };
+    EXPECT_EQ(renderer.render(request).picture, expected.picture);
+    ASSERT_GE(told.size(), 5u) << "hits, normals, three rounds of ambient rays";
+    EXPECT_TRUE(std::ranges::is_sorted(told));
+    EXPECT_LE(told.front(), 50);
+    EXPECT_GT(told.back(), 90);
+    EXPECT_LE(told.back(), 100);
+    EXPECT_TRUE(is_layered || told.back() == 100) << told.back();
+  }
+}
+
 /// Level, cell and position are a point at distance t; also where several levels draw.
 TEST_P(ApiOnDevice, HitsOfLevelsSayWhereTheyAre) {
   const auto volume = sphere({.tolerance = 0.001, .levels = 3});

@@ -469,7 +469,7 @@ void expect_by_team(std::uint32_t size, const CompressedVolume &volume,
     FrameRequest coarse = cases[0].request;
     coarse.voxel_pixels = 1000;
     EXPECT_THAT([&] { renderer.render(coarse); },
-                testing::ThrowsMessage<Error>(testing::HasSubstr("convert with --levels")));
+                testing::ThrowsMessage<Error>(testing::HasSubstr("or compress it with ")));
   };
   std::vector<std::jthread> threads;
   for (std::uint32_t rank = 0; rank < size; ++rank) threads.emplace_back(work, rank);

@@ -399,7 +399,7 @@ TEST_P(CertifyOnDevice, RefusesWhatIsNotKnown) {
   volume.max_voxel_error.reset();
   volume.bounds = {};
   EXPECT_THAT([&] { certify_with(volume, {.size = kSmall, .with_bounds = true}); },
-              ThrowsMessage<Error>(HasSubstr("--no-verify")));
+              ThrowsMessage<Error>(HasSubstr("measure the error")));
   volume = scene.volume;
   volume.coarser_levels[0].bounds = {};
   EXPECT_NO_THROW(certify_with(volume, {.size = kSmall, .with_bounds = true}));

@@ -70,6 +70,18 @@ TEST(CliOptions, EmptyValuesAreRefused) {
   expect_one_line_error("compare '' ''", "the value is empty");
 }
 
+TEST(CliOptions, UnexpectedArgumentsAreNamedInTheirOrder) {
+  expect_one_line_error(kRender + "--upwards 0 0 1", "unexpected arguments --upwards 0 0 1: see");
+  expect_one_line_error("man page", "unexpected argument page: see --help");
+}
+
+TEST(CliOptions, OnePassIsNamedSo) {
+  const TemporaryFolder folder;
+  const auto run = run_isowave("render " + kHead + " -i 1000 --size 8x8 --device cpu -o " +
+                               quoted(folder / "a.png"));
+  EXPECT_NE(run.out.find(" 0 rays hit, 1 pass, "), std::string::npos) << run.out << run.err;
+}
+
 TEST(CliOptions, NumbersAreDecimalFiniteAndInRange) {
   for (const char *value : {"-1", "0", "GB", "18446744073709551616", "1e30GB", "99999999999EB",
                             "-1GB", "1.5GB", "1XB", " 1GB "})

@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "core/zfp/zfp_stream.hpp"
 #include "tests/run_program.hpp"
@@ -45,6 +46,11 @@ TEST(Cli, ConvertAndInfo) {
   const auto text = run_isowave("info " + kHead);
   EXPECT_EQ(text.status, 0) << text.err;
   EXPECT_NE(text.out.find("value_range     0.0 228.0"), std::string::npos) << text.out;
+  const std::string of_zfp = run_isowave("info " + zfp).out;
+  EXPECT_NE(of_zfp.find("\nmax_voxel_error "), std::string::npos) << of_zfp;
+  std::istringstream lines(of_zfp);
+  for (std::string line; std::getline(lines, line) && !line.starts_with("isovalues");)
+    EXPECT_EQ(line.substr(15, 1), " ") << line;
 }
 
 TEST(Cli, WhatWasDoneToAHeaderIsOneLine) {

@@ -130,7 +130,7 @@ TEST_F(ForeignValues, OthersAreRefusedInOneLine) {
   };
   for (const float value : {kInfinity, -kInfinity}) {
     write(one(value), "-R");
-    refused("voxel (5,9,12) is infinite: decode the file by zfp -h -z");
+    refused("voxel x=5, y=9, z=12 is infinite: decode the file by zfp -h -z");
   }
   for (const std::string mode : {"-R", "-a 1e30", "-r 16", "-r 8"}) {
     write(one(mode == "-r 8" ? -3e38f : 1e38f), mode);

@@ -319,7 +319,7 @@ class BoundDrawer {
               ImageSize size)
       : renderer_(renderer),
         volume_(volume),
-        request_(without_light_rays(request)),
+        request_(without_calls(without_light_rays(request))),
         levels_(renderer.levels()),
         frames_(make_level_frames(levels_, request.camera, size, request.isovalue,
                                   request.voxel_pixels)),
@@ -328,7 +328,6 @@ class BoundDrawer {
     request_.slices = {};
     request_.field_values = false;
     request_.normals = Normals::kCell;
-    request_.on_pass = {};
     while (!draws(frames_[coarsest_])) --coarsest_;
     const glm::dmat3 voxel = levels_[coarsest_].index_to_world();
     cell_rounding_ =

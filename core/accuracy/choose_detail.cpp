@@ -66,7 +66,7 @@ void advise(const CompressedVolume &volume, double error, double max_surface_err
   const std::string half =
       fmt::format("at full detail half of those with a bound are within {:.3g}", choice.median);
   if (choice.tolerance) {
-    choice.advice = fmt::format("{}; a volume converted with --tolerance {:.2g} would do", half,
+    choice.advice = fmt::format("{}; a volume compressed with a tolerance of {:.2g} would do", half,
                                 *choice.tolerance);
   } else if (error <= least) {
     choice.advice = "voxels can hardly be stored with a smaller error than these have";
@@ -82,10 +82,9 @@ void advise(const CompressedVolume &volume, double error, double max_surface_err
 
 /// The request for hits alone: rays end at the first, also on what is translucent.
 FrameRequest of_first_hits(FrameRequest request) {
-  request = without_light_rays(std::move(request));
+  request = without_calls(without_light_rays(std::move(request)));
   request.normals = Normals::kCell;
   request.field_values = false;
-  request.on_pass = {};
   for (SurfaceStyle &surface : request.surfaces) surface.opacity = 1;
   for (Slice &slice : request.slices.planes) slice.opacity = 1;
   return request;

@@ -61,10 +61,9 @@ class Tiles {
   /// Draws the references.
   Tiles(Renderer &renderer, const FrameRequest &request, std::span<const Camera> series)
       : renderer_(renderer),
-        request_(without_light_rays(request)),
+        request_(without_calls(without_light_rays(request))),
         size_(size_of(request, renderer.abilities())),
         levels_(renderer.levels()) {
-    request_.on_pass = {};
     const std::vector<Camera> views = views_of(request.camera, series);
     const auto of_view = static_cast<std::uint32_t>((kNumTiles + views.size() - 1) / views.size());
     const TileSample sample = sample_tiles(size_, of_view, kTileSide);

@@ -91,13 +91,18 @@ Frame Renderer::Implementation::draw(const FrameRequest &request) {
       return progress.show(pass, request.on_pass);
     };
   }
+  if (request.on_progress) {
+    wanted.on_progress = [&, most = 0.0](double percent) mutable {
+      request.on_progress(most = std::max(most, percent));
+    };
+  }
   last_ = {renderer_->render(wanted), {}};
   const core::FrameStats &stats = last_.stats;
   Frame frame;
   describe_frame(request, stats, frame);
   frame.statistics.errors_are_stated = volume_.errors_are_stated;
   note_memory();
-  wanted.on_pass = {};
+  wanted = without_calls(std::move(wanted));
   if (stats.detail) {
     wanted = as_chosen(std::move(wanted), *stats.detail, renderer_->abilities().largest);
     if (team.rank() == 0) frame.detail = public_choice(*stats.detail);

@@ -197,7 +197,7 @@ glm::uvec3 parse_bricks(std::string_view text) {
                             ? std::nullopt
                             : parse_all<std::uint32_t>(rest.substr(0, end));
     if (!number || *number == 0 || *number > 1u << 16)
-      throw Error("--bricks {}: write XxYxZ, how many along each axis", text);
+      throw Error("bricks {}: write XxYxZ, how many along each axis", text);
     bricks[axis] = *number;
     rest.remove_prefix(axis < 2 ? end + 1 : end);
   }

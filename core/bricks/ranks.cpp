@@ -68,7 +68,7 @@ Cuts cut_for(const Team &team, const VolumeInfo &whole, const std::string &brick
   if (bricks.empty()) return {blocks_along(whole), team.size(), num_blocks, unit};
   const glm::uvec3 along = parse_bricks(bricks);
   if (std::uint64_t{along.x} * along.y * along.z != team.size())
-    throw Error("--bricks {}: {} processes draw a brick each", bricks, team.size());
+    throw Error("bricks {}: {} processes draw a brick each", bricks, team.size());
   return {blocks_along(whole), along, unit};
 }
 

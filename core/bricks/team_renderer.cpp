@@ -62,7 +62,7 @@ void TeamRenderer::check_levels(const FrameRequest &request) const {
     return;
   throw Error(
       "{} bricks can be cut at {} of the {} levels of detail, and with voxels {:.3g} pixels apart "
-      "the frame has coarser ones: start fewer processes, or convert with --levels {}",
+      "the frame has coarser ones: start fewer processes, or compress it with {} levels",
       team_.size(), num_levels_, whole_levels_.size(), request.voxel_pixels, num_levels_);
 }
 
@@ -74,12 +74,19 @@ FrameStats TeamRenderer::render(const FrameRequest &request) {
   forget_hits();
   num_hits_.reset();
   has_whole_ = false;
+  FrameRequest own = without_light_rays(request);
+  if (const double num_rounds = light_rays_of(request).count();
+      request.on_progress && num_rounds != 0) {
+    own.on_progress = [&request, num_rounds](double percent) {
+      request.on_progress(percent / (1 + num_rounds));
+    };
+  }
   FrameStats stats;
   if (!request.surfaces.empty()) {
     draw_layers(request, stats);
   } else {
-    stats = draw_brick(without_light_rays(request),
-                       [&](const FrameRequest &own) { return renderer_.render(own); });
+    stats = draw_brick(
+        own, [&](const FrameRequest &of_brick) { return renderer_.render(of_brick); });
     if (light_rays_of(request).count() != 0 && !stats.cancelled) add_ambient(request, stats);
   }
   stats.complete = !stats.cancelled;
@@ -379,6 +386,7 @@ void TeamRenderer::add_ambient(const FrameRequest &request, FrameStats &stats) {
     } else {
       cast_round(request, round, placed, open, stats.ambient);
     }
+    if (request.on_progress) request.on_progress(100.0 * (round + 2) / (light_rays.count() + 1));
     const bool is_last = round + 1 == light_rays.count();
     if (!is_last && !request.on_pass) continue;
     together(team_, [&] { renderer_.set_open(open); });

@@ -22,6 +22,12 @@ namespace isowave::core {
 /// after each pass; otherwise the host stays a pass ahead.
 using OnPass = std::function<bool(const PassStats &)>;
 
+/// Called now and then, by the thread that draws, with the percentage of the frame's work that is
+/// done, as if each ray of light took as long as one of the camera. Neither the frame nor its
+/// statistics depend on it, and the host waits for nothing more. It may fall if a SoonRenderer
+/// begins anew.
+using OnProgress = std::function<void(double percent)>;
+
 /// The evidence for a largest surface error (core/accuracy/choose_detail.hpp).
 enum class Evidence {
   kProof,  ///< bounds of most pixels, against the volume before compression
@@ -87,6 +93,7 @@ struct FrameRequest {
   /// Time in which the largest picture possible is drawn (timed_renderer.hpp).
   std::optional<double> time_budget_ms{};
   OnPass on_pass{};
+  OnProgress on_progress{};  ///< not called within a time budget
 };
 
 /// The same request with another camera.
@@ -104,6 +111,13 @@ inline FrameRequest without_light_rays(FrameRequest request) {
 /// The same request with a time budget [ms].
 inline FrameRequest within_ms(double time_budget_ms, FrameRequest request) {
   request.time_budget_ms = time_budget_ms;
+  return request;
+}
+
+/// The same request without calls back.
+inline FrameRequest without_calls(FrameRequest request) {
+  request.on_pass = {};
+  request.on_progress = {};
   return request;
 }
 

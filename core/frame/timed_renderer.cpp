@@ -106,6 +106,7 @@ TimedRenderer::Drawn TimedRenderer::draw_step(const FrameRequest &request, std::
                                               bool is_first, double begin_ms, double end_ms) {
   Drawn drawn;
   FrameRequest in_time = request_of(request, step);
+  in_time.on_progress = {};
   double pass_begin = begin_ms;
   // Further passes have fewer rays, so the next one mostly takes no longer than the last.
   in_time.on_pass = [&](const PassStats &pass) {

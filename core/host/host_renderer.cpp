@@ -1,10 +1,13 @@
 #include "core/host/host_renderer.hpp"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cmath>
 #include <mutex>
+#include <numeric>
+#include <thread>
 #include <utility>
 
 #include "core/base/error.hpp"
@@ -69,6 +72,15 @@ void clip_levels(std::span<HostLevel> drawing, const ClipParams &clip, const Scr
 template <class Count>
 Count rounded_up(Count count, std::uint32_t unit) {
   return (count + unit - 1) / unit;
+}
+
+/// The work of a frame's loops, in their order; that for the camera's rays is 1. In frames of
+/// several surfaces, one loop does all.
+std::array<double, 3> work_of(const FrameRequest &request) {
+  if (!request.surfaces.empty()) return {1, 0, 0};
+  const LightRays rays = light_rays_of(request);
+  const double num_rays = rays.count() + (rays.bounces ? rays.num_ambient : 0);
+  return {1, request.field_values ? 1.0 : 0.0, num_rays};
 }
 
 }  // namespace
@@ -318,7 +330,7 @@ void HostRenderer::draw_bands(const FrameRequest &request, DrawTile draw_tile, F
   }
   std::atomic<std::uint64_t> num_hits = 0;
   stats.cancelled = !for_bands(
-      request.on_pass, light_rays_of(request).count() != 0 || request.field_values,
+      request, Loop::kHits,
       [&](const RayTile &tile, bool is_alone) {
         for (std::size_t y = tile.begin_y; y < tile.end_y; ++y) {
           const auto row = hits_.begin() + static_cast<std::ptrdiff_t>(y * frame_.view.width);
@@ -356,7 +368,7 @@ void HostRenderer::add_ambient(const FrameRequest &request, std::span<const Host
   if (light_rays.num_shadow != 0)
     open_.counts.resize(2 * hits_.size(), static_cast<uchar>(light_rays.num_shadow));
   stats.cancelled = !for_bands(
-      request.on_pass, false,
+      request, Loop::kLight,
       [&](const RayTile &tile, bool) {
         for (uint level = 0; level < drawing.size(); ++level) {
           const float voxel = std::ldexp(1.0f, static_cast<int>(stats.first_level + level));
@@ -405,7 +417,16 @@ void HostRenderer::filter_bounced(const View &view, std::span<const GivenRay> pl
 /// done)). Returns false if on_pass says to stop, and there is more to draw: bands,
 /// or what follows.
 template <class Draw, class After>
-bool HostRenderer::for_bands(const OnPass &on_pass, bool more_follows, Draw draw, After after) {
+bool HostRenderer::for_bands(const FrameRequest &request, Loop loop, Draw draw, After after) {
+  const OnPass &on_pass = request.on_pass;
+  const bool more_follows = (loop != Loop::kLight && light_rays_of(request).count() != 0) ||
+                            (loop == Loop::kHits && request.field_values);
+  const std::array<double, 3> work = work_of(request);
+  const auto own = static_cast<std::size_t>(loop);
+  const double before = std::reduce(work.begin(), work.begin() + own),
+               all = std::reduce(work.begin(), work.end());
+  const std::thread::id own_thread = std::this_thread::get_id();
+  std::atomic<std::uint64_t> num_tiles = 0;
   const std::uint32_t width = frame_.view.width, rows = frame_.view.height,
                       tile_rows = std::max(kTileRays / size_.samples, 1u) * size_.samples;
   const std::uint32_t columns = rounded_up(width, kTileRays);
@@ -421,6 +442,9 @@ bool HostRenderer::for_bands(const OnPass &on_pass, bool more_follows, Draw draw
                      y = static_cast<std::uint32_t>(row + tile / columns * tile_rows);
           draw(RayTile{x, y, std::min(x + kTileRays, width), std::min(y + tile_rows, end_row)},
                is_alone);
+          const double share = double(++num_tiles) / (columns * rounded_up(rows, tile_rows));
+          if (request.on_progress && std::this_thread::get_id() == own_thread)
+            request.on_progress(100 * (before + std::min(share, 1.0) * work.at(own)) / all);
         });
     const PassStats pass = after(end_row);
     if (on_pass && !on_pass(pass) && (end_row < rows || more_follows)) return false;
@@ -432,7 +456,7 @@ bool HostRenderer::for_bands(const OnPass &on_pass, bool more_follows, Draw draw
 void HostRenderer::add_field_values(const FrameRequest &request, FrameStats &stats) {
   const auto begin = std::chrono::steady_clock::now();
   stats.cancelled = !for_bands(
-      request.on_pass, light_rays_of(request).count() != 0,
+      request, Loop::kField,
       [&](const RayTile &tile, bool) {
         for (std::size_t y = tile.begin_y; y < tile.end_y; ++y) {
           const std::size_t first = y * frame_.view.width + tile.begin_x;

@@ -83,6 +83,8 @@ class HostRenderer : public Renderer {
   double setup_ms() const override { return setup_ms_; }
 
  private:
+  /// The loops over a frame's rays, in their order.
+  enum class Loop { kHits, kField, kLight };
   void check_has_picture() const;
   void show_kept(bool everywhere);
   template <class Draw>
@@ -108,7 +110,7 @@ class HostRenderer : public Renderer {
   using LayerHits = std::vector<std::vector<LayerHit>>;  ///< [layer] of all rays
   void blend_bounced(const FrameParams &frame, const LayerBlend &by, const LayerHits &layers);
   template <class Draw, class After>
-  bool for_bands(const OnPass &on_pass, bool more_follows, Draw draw, After after);
+  bool for_bands(const FrameRequest &request, Loop loop, Draw draw, After after);
 
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();  ///< of making
   const CompressedVolume &volume_;

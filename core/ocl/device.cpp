@@ -108,15 +108,14 @@ Device::Device(const DeviceInfo &info, bool profiling) : info_(info), device_(de
   const Capabilities &can = info_.capabilities;
   try {
     if (!device_.getInfo<CL_DEVICE_COMPILER_AVAILABLE>()) {
-      throw Error("device '{}' has no OpenCL C compiler: choose another with --device", info_.name);
+      throw Error("device '{}' has no OpenCL C compiler: choose another device", info_.name);
     }
     if (const std::string lack = lacking(device_, can); !lack.empty()) {
-      throw Error("device '{}' has {}: choose another with --device", info_.name, lack);
+      throw Error("device '{}' has {}: choose another device", info_.name, lack);
     }
     if (can.local_memory < kNeededLocalMemory) {
-      throw Error(
-          "device '{}' has {} KiB of local memory, {} are needed: choose another with --device",
-          info_.name, can.local_memory >> 10, kNeededLocalMemory >> 10);
+      throw Error("device '{}' has {} KiB of local memory, {} are needed: choose another device",
+                  info_.name, can.local_memory >> 10, kNeededLocalMemory >> 10);
     }
     context_ = DeviceContext::of(device_);
     const cl::Context &context = context_->context;

@@ -1,6 +1,7 @@
 // DeviceRenderer's frames of several and translucent surfaces, and their colours by a field.
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -25,12 +26,22 @@ bool any_goes_on(const LayerCounts &counts) {
 
 }  // namespace
 
+/// Each wave of layers takes half of what is left.
+void DeviceRenderer::Frame::tell(double percent) const {
+  if (!on_progress) return;
+  const bool is_known = num_waves != 0;
+  const std::uint32_t last = is_known ? num_waves - 1 : std::numeric_limits<std::uint32_t>::max();
+  const double done = last - waves_left + percent / 100;
+  on_progress(is_known ? 100 * done / num_waves : 100 * (1 - std::exp2(-done)));
+}
+
 /// Layer by layer: each ray's nearest hit of all surfaces gets its gradient and is blended. Rays
 /// that go on find the next hit of that surface.
 void DeviceRenderer::draw_layers(const FrameRequest &request, Frame &frame) {
   std::vector<float> isovalues = isovalues_of_layers(request.surfaces);
   FrameStats &stats = frame.stats;
   frame.waves_left = std::numeric_limits<std::uint32_t>::max();  // as many as it takes
+  frame.num_waves = 0;
   last_view_.reset();
   const VolumeInfo &finest = blocks_.levels[0].info;
   layers_->open(

@@ -63,6 +63,8 @@ FrameStats DeviceRenderer::render(const FrameRequest &request) {
   Frame frame{request.on_pass, light_rays.count() +
                                    (light_rays.bounces ? light_rays.num_ambient : 0) +
                                    (is_smooth ? 1 : 0) + (request.field_values ? 1 : 0)};
+  frame.on_progress = request.on_progress;
+  frame.num_waves = frame.waves_left + 1;
   begin_frame(request);
   frame.stats.first_level = blocks_.drawing.first;
   frame.stats.last_level = blocks_.drawing.end - 1;
@@ -124,6 +126,7 @@ void DeviceRenderer::run(Wave &wave, Frame &frame, Wave *next) {
   for (bool finished = false; !finished && !frame.stats.cancelled;) {
     while (passes_.are_read() || (!in_step && passes_.have_room())) passes_.enqueue(wave);
     PassStats pass = stats_of(passes_.pop(), blocks);
+    frame.tell(pass.completed_percent);
     finished = pass.counts.next_active_count == 0;
     if (sum != nullptr) {
       *sum += later_pass(pass);

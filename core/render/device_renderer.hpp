@@ -177,6 +177,11 @@ class DeviceRenderer : public Renderer {
     const OnPass &on_pass;
     std::uint32_t waves_left;  ///< waves that follow the one at work
     FrameStats stats{};
+    OnProgress on_progress{};
+    std::uint32_t num_waves = 0;  ///< 0: as many as it takes
+
+    /// percent  of the wave at work
+    void tell(double percent) const;
   };
 
   /// The surface whose hits a frame finds first: the only one, or the innermost.

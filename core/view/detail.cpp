@@ -112,7 +112,7 @@ void check_voxel_pixels(double voxel_pixels) {
 
 void check_has_levels(const CompressedVolume &volume) {
   if (!volume.coarser_levels.empty() || max_levels(volume.info.dims) == 1) return;
-  throw Error("the volume has no levels of detail: convert it with --levels");
+  throw Error("the volume has no levels of detail: compress it with levels");
 }
 
 std::vector<FrameParams> make_level_frames(std::span<const VolumeInfo> levels, const Camera &camera,

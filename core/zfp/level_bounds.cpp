@@ -204,9 +204,8 @@ ValueOffset value_offset(const LevelError &error, FieldBound bound, double plane
     throw Error("the volume's range of values is not known: convert it again");
   if (!error.uniform) {
     throw Error(
-        "the volume's error is not known, or not that of its levels of detail: convert it again, "
-        "with --levels and without "
-        "--no-verify");
+        "the volume's error is not known, or not that of its levels of detail: compress it again, "
+        "with its levels, and measure the error");
   }
   const double beyond =
       2 * (error.largest + plane_error);  // the range, as decoded, raised and lowered

@@ -204,12 +204,14 @@ class ZfpFileReader {
                             glm::u64vec3(voxel & 3u, voxel >> 2u & 3u, voxel >> 4u);
     if (std::isinf(values[voxel])) {
       fail(
-          "voxel ({},{},{}) is infinite: decode the file by zfp -h -z, and convert its voxels with "
-          "--no-data or --map-nan",
+          "voxel x={}, y={}, z={} is infinite: decode the file by zfp -h -z, and compress its "
+          "voxels "
+          "with a value for those without data, or in place of NaN",
           at.x, at.y, at.z);
     }
     fail(
-        "voxel ({},{},{}) is {:.4g}: voxels beyond +-{:.4g} cannot be drawn, scale the volume down",
+        "voxel x={}, y={}, z={} is {:.4g}: voxels beyond +-{:.4g} cannot be drawn, scale the "
+        "volume down",
         at.x, at.y, at.z, values[voxel], kMaxMagnitude);
   }
 

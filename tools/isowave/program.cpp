@@ -1,6 +1,7 @@
 #include "tools/isowave/program.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <cerrno>
 #include <cstdio>
@@ -65,6 +66,13 @@ std::string text_of(const CLI::RequiredError &error, const CLI::App &app) {
   return fmt::format("{}; '{}' is none: see --help", error.what(), unknown.front());
 }
 
+/// The arguments that no command takes, in their order.
+std::string text_of_extras(const CLI::App &app) {
+  const std::vector<std::string> extras = app.remaining(true);
+  return fmt::format("unexpected argument{} {}: see --help", extras.size() == 1 ? "" : "s",
+                     fmt::join(extras, " "));
+}
+
 /// The program and the subcommand that was asked for: "isowave bench pareto".
 std::string command_name(const CLI::App &app) {
   std::string name = app.get_name();
@@ -125,6 +133,8 @@ int run_program(CLI::App &app, int argc, char **argv) {
     status = result.get_exit_code();
   } catch (const CLI::RequiredError &error) {
     message = text_of(error, app);
+  } catch (const CLI::ExtrasError &) {
+    message = text_of_extras(app);
   } catch (...) {
     message = text_of_failure(command_name(app));
   }

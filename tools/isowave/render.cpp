@@ -191,6 +191,11 @@ std::string text_of_surfaces(const RenderArgs &options, double isovalue) {
   return fmt::format("isovalue{} {}", isovalues.size() == 1 ? "" : "s", fmt::join(isovalues, ", "));
 }
 
+/// "1 pass, ", "2 passes, "
+std::string counted(std::size_t count, std::string_view one, std::string_view many) {
+  return fmt::format("{} {}, ", count, count == 1 ? one : many);
+}
+
 /// Draws one frame and all that is asked of it.
 ///
 /// own      gets this process's statistics
@@ -200,8 +205,10 @@ ordered_json draw_frame(const FrameOfMany &frame, ordered_json &own) {
   Drawing &drawing = frame.drawing;
   const auto begin = std::chrono::steady_clock::now();
   const double composed_before = drawing.is_team() ? drawing.of_team->composition().ms : 0;
-  const isowave::FrameRequest request = frame.request();
+  isowave::FrameRequest request = frame.request();
+  request.on_progress = make_frame_bar();
   const Frame drawn = drawing.renderer->render(request);
+  request.on_progress = {};  // which erases the bar
   frame.write_outputs(request, drawn);
   const std::uint64_t num_hits = drawn.statistics.hits;
   const LastFrame &last = drawing.renderer->last();
@@ -223,8 +230,8 @@ ordered_json draw_frame(const FrameOfMany &frame, ordered_json &own) {
              {"composition_ms", drawing.of_team->composition().ms - composed_before}};
   } else {
     fmt::print("{}: {} rays hit, {}{}{:.1f} ms\n", what, with_commas(num_hits),
-               draws_layers(options) ? fmt::format("{} layers, ", last.stats.layers.layers) : "",
-               drawing.on_host() ? "" : fmt::format("{} passes, ", last.stats.passes.size()),
+               draws_layers(options) ? counted(last.stats.layers.layers, "layer", "layers") : "",
+               drawing.on_host() ? "" : counted(last.stats.passes.size(), "pass", "passes"),
                drawn.statistics.total_ms);
     entry["total_ms"] = drawn.statistics.total_ms;
   }

@@ -3,11 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 
 #include "core/base/error.hpp"
+#include "core/base/ms_since.hpp"
 #include "core/base/text.hpp"
 #include "core/bricks/brick_volume.hpp"
 #include "core/io/raw_reader.hpp"
@@ -227,6 +229,15 @@ Progress make_progress_bar(std::string_view label) {
     const int filled = percent * kWidth / 100;
     fmt::print(stderr, "\r{} [{:#<{}}{:.<{}}] {}%", text, "", filled, "", kWidth - filled, percent);
     std::fflush(stderr);
+  };
+}
+
+std::function<void(double percent)> make_frame_bar() {
+  const Progress bar = make_progress_bar("drawing");
+  if (!bar) return {};
+  return [bar, begin = std::chrono::steady_clock::now()](double percent) {
+    constexpr double kQuietMs = 2000;
+    if (ms_since(begin) >= kQuietMs) bar(static_cast<std::uint32_t>(percent), 100);
   };
 }
 

@@ -98,6 +98,8 @@ Storage storage_for(const std::string &path, const CompressionOptions &compressi
 /// A bar on stderr while it is a terminal; silent elsewhere. Copies share the bar, which ends with
 /// the last.
 Progress make_progress_bar(std::string_view label);
+/// The same for a frame, by percent; shown after two seconds.
+std::function<void(double percent)> make_frame_bar();
 
 /// 1,234,567
 std::string with_commas(std::uint64_t number);

@@ -341,12 +341,21 @@ class PyRenderer {
   PyRenderer &operator=(const PyRenderer &) = delete;
 
   /// on_pass     called after each pass with a PassView; False from it ends the frame
+  /// progress    called ten times a second with the part of the frame that is done, 0 to 1
   /// interrupts  signals are looked for after each pass, which waits for that
   nb::dict render(const nb::dict &options, const std::optional<nb::callable> &on_pass,
-                  bool interrupts) {
+                  const std::optional<nb::callable> &progress, bool interrupts) {
     isowave::FrameRequest request = request_of(options);
     if (!renderer_->ready_for(request)) wait();
     isowave::Frame frame = without_gil([&](Callbacks &callbacks) {
+      if (progress) {
+        request.on_progress = [&, last = std::chrono::steady_clock::now()](double percent) mutable {
+          const auto now = std::chrono::steady_clock::now();
+          if (now - last < std::chrono::milliseconds(100)) return;
+          last = now;
+          callbacks.run([&] { call(*progress, percent / 100); });
+        };
+      }
       if (on_pass || interrupts) {
         request.on_pass = [&](const isowave::Progress &progress) {
           return show_pass(callbacks, on_pass, progress);
@@ -453,7 +462,8 @@ void add_renderers(nb::module_ &m) {
       .def_prop_ro("completed_percent", &PassView::completed_percent)
       .def("picture", &PassView::picture);
   nb::class_<PyRenderer>(m, "Renderer")
-      .def("render", &PyRenderer::render, "request"_a, "on_pass"_a.none(), "interrupts"_a)
+      .def("render", &PyRenderer::render, "request"_a, "on_pass"_a.none(), "progress"_a.none(),
+           "interrupts"_a)
       .def("cast_rays", &PyRenderer::cast_rays, "rays"_a, "isovalue"_a, "normals"_a)
       .def("turntable", &PyRenderer::turntable, "values"_a, "num_views"_a, "width"_a, "height"_a,
            "labels"_a = false)

@@ -225,6 +225,11 @@ struct FrameRequest {
   /// picture so far. In a team, all processes have an on_pass or none, and all of them ask for the
   /// picture of a pass, or none does. If it returns false in any process, the frame stops in all.
   std::function<bool(const Progress &)> on_pass{};
+
+  /// Called now and then, by the thread that draws, with the percentage of the frame's work that is
+  /// done; it never falls. The frame and its statistics are those without it. Not called within a
+  /// time budget, nor in frames of several surfaces of a team.
+  std::function<void(double percent)> on_progress{};
 };
 
 /// First crossing of a ray with the isosurface, or with the nearest of several: the true crossing

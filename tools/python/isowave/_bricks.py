@@ -6,7 +6,7 @@ import os
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -15,11 +15,23 @@ from isowave import _core
 from isowave._camera import Camera, turntable_of, view_count
 from isowave._checked import Isovalue, number, size_of
 from isowave._compress import compression_options
+from isowave._handed_on import takes
 from isowave._image import Image
 from isowave._placed import Placed
-from isowave._renderer import draw, goes_on, renderer_options, warn_of_isovalue
-from isowave._request import OnPass, Progress, Request, isovalue_or_surfaces
+from isowave._renderer import Renderer, draw, goes_on, renderer_options, warn_of_isovalue
+from isowave._report import Device
+from isowave._request import (
+    FrameArguments,
+    OnPass,
+    Progress,
+    Request,
+    isovalue_or_surfaces,
+    request_of,
+)
 from isowave._surface import Surface
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 OUTPUTS = ("rgb", "depth", "normals")
 ALL_OUTPUTS = (*OUTPUTS, "bounds", "field")
@@ -165,9 +177,9 @@ class BrickRenderer(Placed[_core.Renderer]):
                 warnings.warn(notice, RuntimeWarning, stacklevel=2)
 
     @property
-    def device(self) -> dict[str, Any]:
+    def device(self) -> Device:
         """This process's device, as Renderer.device."""
-        return self._core.device
+        return Device(self._core.device)
 
     def camera(
         self,
@@ -204,6 +216,14 @@ class BrickRenderer(Placed[_core.Renderer]):
         cameras = self._core.turntable(request.values, count, width, height, request.has_labels)
         return [Camera(*camera) for camera in cameras]
 
+    def __repr__(self) -> str:
+        (width, height), processes = self.size, self._processes
+        rank = f"rank {processes.rank} of {processes.size}"
+        return f"<isowave.BrickRenderer {width} x {height}, {rank}, {self.device['name']}>"
+
+    def __reduce__(self) -> Any:
+        raise TypeError("a BrickRenderer cannot be pickled: each process makes its own")
+
     def _checked(self, request: Request) -> Request:
         if request.has_labels and not self._has_labels:
             raise _core.Error("labels needs a renderer that was made with labels=True")
@@ -219,15 +239,9 @@ class BrickRenderer(Placed[_core.Renderer]):
 
         return call
 
+    @takes(Renderer.render, without=("time_budget",), outputs=OUTPUTS)
     def render(
-        self,
-        isovalue: float | None = None,
-        *,
-        camera: Camera | None = None,
-        size: tuple[int, int] | None = None,
-        surfaces: Sequence[Surface] = (),
-        outputs: Sequence[str] = OUTPUTS,
-        **more: Any,
+        self, isovalue: float | None = None, **frame: Unpack[FrameArguments]
     ) -> Image | None:
         """Draws a frame; arguments as Renderer.render(), without positions and time_budget.
 
@@ -249,14 +263,10 @@ class BrickRenderer(Placed[_core.Renderer]):
         """
 
         def ask() -> Request:
-            request = Request(
-                given_isovalue(isovalue_or_surfaces(isovalue, surfaces)),
-                camera,
-                self.size if size is None else size,
-                surfaces=surfaces,
-                outputs=outputs,
-                **more,
-            )
+            value = given_isovalue(isovalue_or_surfaces(isovalue, frame.get("surfaces", ())))
+            request = request_of(value, {"outputs": OUTPUTS, **frame})
+            if request.size is None:
+                request = replace(request, size=self.size)
             for name in request.outputs:
                 if name not in ALL_OUTPUTS:
                     raise ValueError(f"outputs {name}: bricks have {', '.join(ALL_OUTPUTS)}")
@@ -265,15 +275,17 @@ class BrickRenderer(Placed[_core.Renderer]):
             return self._checked(request)
 
         request = self._processes.together(ask)
-        if len(set(self._processes.all_gather(b"" if camera is None else b"given"))) > 1:
+        if len(set(self._processes.all_gather(b"" if request.camera is None else b"given"))) > 1:
             raise _core.Error("some processes give a camera, and others none: ask alike")
-        if camera is None:
+        if request.camera is None:
             request = replace(request, camera=self.camera(size=request.size))
         if request.on_pass is not None:
             request = replace(request, on_pass=self._for_all(request.on_pass))
-        frame = draw(self._core, request, interrupts=False)
-        if self._processes.rank != 0:
+        is_first = self._processes.rank == 0
+        progress = request.progress if is_first else False
+        drawn = draw(self._core, request, interrupts=False, progress=progress)
+        if not is_first:
             return None
         for value in request.isovalues:
             warn_of_isovalue(self._core, value)
-        return Image(frame, request)
+        return Image(drawn, request)

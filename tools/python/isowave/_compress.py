@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
-import sys
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 import numpy.typing as npt
@@ -23,10 +21,28 @@ from isowave._files import (
     parse_index,
     source_of_file,
 )
+from isowave._progress import Progress, shown
 from isowave._volume import Volume, warn_of_file
 
-#: Called with a step's name ("compressing") and how much of the step is done, 0 to 1.
-Progress = Callable[[str, float], object]
+
+class OpenArguments(TypedDict, total=False):
+    """Arguments of open() beside the path."""
+
+    tolerance: float | None
+    relative_tolerance: float | None
+    rate: int | None
+    exact: bool
+    shape: Sequence[int] | None
+    dtype: npt.DTypeLike | None
+    spacing: Sequence[float] | None
+    dataset: str | None
+    index: Index | None
+    levels: int
+    map_nan: float | None
+    no_data: float | None
+    progress: bool | Progress | None
+    num_threads: int
+
 
 SUPPORTED_TYPES = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64")
 
@@ -63,52 +79,6 @@ def compression_options(
         # If nothing bounds the error, it is measured: users ask for it.
         "measure_error": not exact and tolerance is None and relative_tolerance is None,
     }
-
-
-class TqdmProgress:
-    """A bar of tqdm's for each step."""
-
-    def __init__(self, tqdm: Any) -> None:
-        self.tqdm, self.bar, self.step = tqdm, None, ""
-
-    def __call__(self, what: str, done: float) -> None:
-        if what != self.step:
-            self.close()
-            self.step = what
-            self.bar = self.tqdm(total=100, desc=what, unit="%", leave=False)
-        if self.bar is not None:
-            self.bar.update(int(100 * done) - self.bar.n)
-
-    def close(self) -> None:
-        if self.bar is not None:
-            self.bar.close()
-
-
-def make_progress(progress: bool | Progress | None) -> Progress | None:
-    """The function to call. progress=None: a bar on a terminal or in a notebook, with tqdm."""
-    if callable(progress):
-        return progress
-    if progress is not None:
-        flag("progress", progress)
-    in_notebook = "ipykernel" in sys.modules
-    if progress is False or (progress is None and not (sys.stderr.isatty() or in_notebook)):
-        return None
-    try:
-        from tqdm.auto import tqdm  # type: ignore[import-untyped,unused-ignore]
-    except ImportError:
-        return None
-    return TqdmProgress(tqdm)
-
-
-@contextlib.contextmanager
-def shown(progress: bool | Progress | None) -> Iterator[Progress | None]:
-    """The function to call with progress; closes its bar at the end."""
-    told = make_progress(progress)
-    try:
-        yield told
-    finally:
-        if isinstance(told, TqdmProgress):
-            told.close()
 
 
 def compress(

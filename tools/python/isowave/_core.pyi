@@ -149,6 +149,7 @@ class Renderer:
         self,
         request: dict[str, Any],
         on_pass: Callable[[PassView], bool | None] | None,
+        progress: Callable[[float], object] | None,
         interrupts: bool,
     ) -> dict[str, Any]: ...
     def cast_rays(

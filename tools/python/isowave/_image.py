@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import os
+import shutil
+import subprocess
+import sys
+import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -159,6 +163,27 @@ class Image:
 
     def _repr_png_(self) -> bytes:
         return _core.encode_png(self._drawn(), camera_for_core(self.camera))
+
+    def show(self) -> None:
+        """Shows the picture: in a notebook's cell, or in the desktop's viewer of PNG files.
+
+        The viewer gets a file in the folder of temporary files, which stays there. Raises Error if
+        there is no display.
+        """
+        shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
+        if getattr(shell, "kernel", None) is not None:
+            from IPython.display import display  # type: ignore[import-not-found,unused-ignore]
+
+            display(self)  # type: ignore[no-untyped-call,unused-ignore]
+            return
+        opener = shutil.which("xdg-open")
+        if not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")) or opener is None:
+            lack = "xdg-open" if opener is None else "display"
+            raise _core.Error(f"there is no {lack} to show the picture: image.save('a.png')")
+        handle, path = tempfile.mkstemp(".png", "isowave_")
+        os.close(handle)
+        self.save(path)
+        subprocess.Popen([opener, path], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
     def save(self, path: str | os.PathLike[str], *, alpha: bool = False) -> None:
         """Writes a .png file, whole or not at all.

@@ -51,5 +51,13 @@ class Mesh:
             mesh.point_data.active_normals = self.normals
         return mesh
 
+    def to_trimesh(self) -> Any:
+        """A trimesh.Trimesh with the same vertices and faces, and the normals. Needs trimesh."""
+        import trimesh
+
+        return trimesh.Trimesh(
+            self.vertices, self.faces, vertex_normals=self.normals, process=False
+        )
+
     def __repr__(self) -> str:
         return f"<isowave.Mesh {len(self.vertices)} vertices, {len(self.faces)} faces>"

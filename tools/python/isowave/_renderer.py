@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import queue
 import sys
@@ -9,7 +10,7 @@ import threading
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypedDict
 
 import numpy as np
 import numpy.typing as npt
@@ -19,18 +20,48 @@ from isowave._camera import Camera, turntable_of, view_count
 from isowave._checked import Isovalue, flag, refuse, size_of, whole
 from isowave._clip import ClipPlane
 from isowave._color_map import ColorMap
+from isowave._handed_on import takes
 from isowave._image import Image
 from isowave._levels import Voxels
+from isowave._progress import Progress as Told
+from isowave._progress import shown
 from isowave._request import (
     ALL_OUTPUTS,
+    FrameArguments,
     OnPass,
     Progress,
     Request,
     isovalue_or_surfaces,
     normals_of,
+    request_of,
 )
+from isowave._report import Device
 from isowave._slice import Slice
 from isowave._surface import MAX_SURFACES, Color, Surface
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+
+class RendererArguments(TypedDict, total=False):
+    """Arguments of Renderer beside the volume."""
+
+    device: str | int | None
+    size: tuple[int, int]
+    samples: int
+    memory_budget: int | None
+    cache_blocks: int
+    levels: bool
+    bounds: bool
+    time_budget: bool
+    rays: bool
+    bounce: bool
+    labels: bool
+    surfaces: int
+    field: Voxels | None
+    profiling: bool
+    quick: bool
+
 
 #: Arguments of Renderer that allow more requests, and their defaults.
 CAPABILITIES: dict[str, int] = {
@@ -90,17 +121,24 @@ def goes_on(on_pass: OnPass, progress: Progress) -> bool:
     return answer is None or flag("what on_pass returns", answer)
 
 
-def draw(renderer: _core.Renderer, request: Request, interrupts: bool = True) -> dict[str, Any]:
+def draw(
+    renderer: _core.Renderer,
+    request: Request,
+    interrupts: bool = True,
+    progress: bool | Told | None = False,
+) -> dict[str, Any]:
     """Draws a frame, and returns its arrays. interrupts: looks for Ctrl-C after each pass."""
     on_pass = request.on_pass
+    with shown(progress) as told:
 
-    def callback(view: _core.PassView) -> bool:
-        assert on_pass is not None
-        return goes_on(on_pass, Progress(view))
+        def callback(view: _core.PassView) -> bool:
+            assert on_pass is not None
+            return goes_on(on_pass, Progress(view))
 
-    is_main = threading.current_thread() is threading.main_thread()
-    watched = None if on_pass is None else callback
-    return renderer.render(request.for_core(), watched, interrupts and is_main)
+        is_main = threading.current_thread() is threading.main_thread()
+        watched = None if on_pass is None else callback
+        done = None if told is None else functools.partial(told, "drawing")
+        return renderer.render(request.for_core(), watched, done, interrupts and is_main)
 
 
 def positions_of(volume: Voxels, positions: npt.NDArray[np.float64]) -> npt.NDArray[Any]:
@@ -207,11 +245,11 @@ class Renderer:
         self._iterating: int | None = None  # the thread that looks at a picture of passes()
 
     @property
-    def device(self) -> dict[str, Any]:
+    def device(self) -> Device:
         """As an entry of isowave.devices(), and notice: a line that names operations whose results
         differ from the host's, or "". Pictures of such a device may differ in last bits. All texts
         are "" if the host draws."""
-        return self._core.device
+        return Device(self._core.device)
 
     @property
     def memory_bytes(self) -> int:
@@ -298,6 +336,7 @@ class Renderer:
         time_budget: float | None = None,
         ambient: int = 0,
         on_pass: Callable[[Progress], bool | None] | None = None,
+        progress: bool | Told | None = None,
     ) -> Image:
         """Draws a frame. Decoded blocks are kept for the next frame.
 
@@ -376,6 +415,8 @@ class Renderer:
             look smooth. Each takes about as long as a frame without any. Needs rays=True.
         on_pass
             Called after each pass with the picture so far. If it returns False, the frame stops.
+        progress
+            As compress() has it, for frames of more than two seconds without time_budget.
 
         Raises
         ------
@@ -404,7 +445,7 @@ class Renderer:
         interrupts = self.device["type"] != "gpu"
         for isovalue in request.isovalues:
             warn_of_isovalue(self._core, isovalue)
-        frame = draw(self._core, request, interrupts)
+        frame = draw(self._core, request, interrupts, request.progress)
         if "positions" in frame:
             frame["positions"] = positions_of(self.volume, frame["positions"])
         return Image(frame, request)
@@ -438,12 +479,20 @@ class Renderer:
             "cell": found["cells"][..., ::-1].reshape(*lead, 3),
         }
 
+    def __reduce__(self) -> Any:
+        raise TypeError(
+            "renderers cannot be pickled: pickle the volume, and call volume.renderer()"
+        )
+
     def __repr__(self) -> str:
         width, height = self.size
         state = "" if self.ready else ", not ready"
         return f"<isowave.Renderer {width} x {height}, {self.device['name'] or 'host'}{state}>"
 
-    def passes(self, isovalue: Isovalue | None = None, **more: Any) -> Iterator[Image]:
+    @takes(render, without=("on_pass", "progress"))
+    def passes(
+        self, isovalue: Isovalue | None = None, **frame: Unpack[FrameArguments]
+    ) -> Iterator[Image]:
         """Yields the picture after each pass, and the finished one last; arguments as render().
 
         Pictures before the last have only rgb, or rgba. The frame waits until the next picture is
@@ -476,8 +525,11 @@ class Renderer:
                 put(error)
             put(None)
 
-        value = self.volume._isovalue(isovalue_or_surfaces(isovalue, more.get("surfaces", ())))
-        request = self._completed(Request(value, on_pass=on_pass, **more))
+        value = self.volume._isovalue(isovalue_or_surfaces(isovalue, frame.get("surfaces", ())))
+        asked = request_of(value, frame)
+        if asked.on_pass is not None or asked.progress:
+            raise TypeError("passes() takes neither on_pass nor progress: it yields the passes")
+        request = self._completed(replace(asked, on_pass=on_pass, progress=False))
         thread = threading.Thread(target=draw, name="isowave passes", daemon=True)
         thread.start()
         try:

@@ -18,14 +18,26 @@ PACKAGES = (
 VARIABLES = ("ISOWAVE_DEVICE", "OCL_ICD_VENDORS", "OCL_ICD_FILENAMES", "POCL_CACHE_DIR")
 
 
-def devices() -> list[dict[str, Any]]:
+class Device(dict[str, Any]):
+    """An OpenCL device, as a dict; repr() is one short line."""
+
+    def __repr__(self) -> str:
+        if not self["name"]:
+            return "<isowave.Device host>"
+        memory = f"{self['memory_bytes'] / 2**30:.1f} GiB"
+        return (
+            "<isowave.Device {index}: {name} ({type}, {platform}, ".format(**self) + f"{memory})>"
+        )
+
+
+def devices() -> list[Device]:
     """The OpenCL devices of this machine, in the loader's order; none if there is no driver.
 
     Each is a dict of index, name, vendor, platform, driver, type ("gpu", "cpu", "accelerator",
     "other") and memory_bytes. `device=` of other functions takes an index, a type, or a part of a
     name or platform; where it chooses a renderer, also "host", which draws without a device.
     """
-    return _core.devices()
+    return [Device(each) for each in _core.devices()]
 
 
 class Report:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +25,7 @@ from isowave._checked import (
 )
 from isowave._clip import ClipPlane, clip_of
 from isowave._color_map import CheckedColorMap, ColorMap, color_map_for_core, color_map_of
+from isowave._progress import Progress as Told
 from isowave._slice import Slice, slice_map_for_core, slice_map_of, slices_of
 from isowave._surface import MAX_SURFACES, Color, Surface, color_of, surface_for_core, surfaces_of
 
@@ -80,6 +82,46 @@ class Progress:
 OnPass = Callable[[Progress], bool | None]
 
 
+class Look(TypedDict, total=False):
+    """Arguments of Renderer.render() that are colours and lights."""
+
+    color_map: ColorMap | str | None
+    slice_map: ColorMap | str
+    background: Color | None
+    background_top: Color | None
+    transparent: bool
+    lights: Mapping[str, float] | None
+    light: Sequence[float] | None
+    shadow_rays: int
+    light_angle: float
+    bounce_rays: int
+
+
+class FrameArguments(Look, total=False):
+    """Arguments of Renderer.render() beside the isovalue."""
+
+    camera: Camera | None
+    size: tuple[int, int] | None
+    samples: int
+    color: Color | None
+    normals: str
+    clip: Sequence[ClipPlane]
+    caps: bool
+    surfaces: Sequence[Surface]
+    slices: Sequence[Slice]
+    outputs: Sequence[str]
+    max_error: float | None
+    by: str
+    max_image_error: float | None
+    series: Sequence[Camera]
+    voxel_pixels: float
+    voxel_error: float
+    time_budget: float | None
+    ambient: int
+    on_pass: OnPass | None
+    progress: bool | Told | None
+
+
 @dataclass(frozen=True)
 class Request:
     """A request of a frame: the arguments of Renderer.render(), which describes them.
@@ -123,6 +165,7 @@ class Request:
     time_budget: float | None = None
     ambient: int = 0
     on_pass: OnPass | None = None
+    progress: bool | Told | None = None
 
     def __post_init__(self) -> None:
         outputs = names("outputs", self.outputs)
@@ -160,6 +203,7 @@ class Request:
             "time_budget": optional("time_budget", self.time_budget),
             "ambient": whole("ambient", self.ambient),
             "on_pass": function("on_pass", self.on_pass),
+            "progress": progress_of(self.progress),
         }
         surfaces = checked["surfaces"]
         if surfaces and self.color is not None:
@@ -274,6 +318,18 @@ class Request:
         }
 
 
+def request_of(isovalue: float, arguments: FrameArguments) -> Request:
+    """The request of these arguments. Raises TypeError: one that there is not."""
+    names = [*FrameArguments.__annotations__]
+    for name in arguments:
+        if name not in names:
+            near = "".join(
+                f": do you mean {each}?" for each in difflib.get_close_matches(name, names, 1)
+            )
+            raise TypeError(f"there is no argument {name}{near}")
+    return Request(isovalue, **arguments)
+
+
 def isovalue_or_surfaces(isovalue: Isovalue | None, surfaces: Sequence[Surface]) -> Isovalue:
     """The isovalue; 0 with surfaces, whose first one has it. Raises TypeError: both, or none."""
     if isovalue is not None and surfaces:
@@ -323,6 +379,10 @@ def evidence_of(by: str) -> str:
     if by not in ("proof", "sample"):
         raise ValueError(f"by {by!r}: give 'proof' or 'sample'")
     return by
+
+
+def progress_of(progress: Any) -> Any:
+    return progress if progress is None or callable(progress) else flag("progress", progress)
 
 
 def optional_color(color: Color | None) -> Any:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from isowave import _core
 from isowave._annotate import Annotations, annotations_for_core
@@ -13,27 +13,35 @@ from isowave._camera import Camera, camera_for_core, vector
 from isowave._checked import Isovalue, number
 from isowave._clip import ClipPlane, clip_of
 from isowave._color_map import ColorMap, color_map_for_core, color_map_of
+from isowave._handed_on import takes
 from isowave._image import Image
 from isowave._levels import Voxels
-from isowave._request import camera_of, lights_of, optional_color
+from isowave._request import (
+    FrameArguments,
+    Look,
+    camera_of,
+    lights_of,
+    optional_color,
+)
+from isowave._renderer import Renderer
 from isowave._slice import Slice, slice_map_for_core, slice_map_of, slices_of
 from isowave._surface import Color, Surface, surface_for_core, surfaces_of
 
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
 
 #: Fields of a Scene that are colours and lights, and arguments of Volume.render().
-LOOK = (
-    "color_map",
-    "slice_map",
-    "field",
-    "background",
-    "background_top",
-    "transparent",
-    "lights",
-    "light",
-    "shadow_rays",
-    "light_angle",
-    "bounce_rays",
-)
+LOOK = ("field", *Look.__annotations__)
+AS_BEFORE: Any = ...  # the default of an argument that leaves a field as it is
+
+
+class SceneFrame(FrameArguments, total=False):
+    """Arguments of Volume.render() beside the isovalue."""
+
+    device: str | int | None
+    memory_budget: int | None
+    field: Voxels | None
 
 
 class SceneVolume(Protocol):
@@ -128,12 +136,25 @@ class Scene:
         """The scene with another view; None: one that the volume's box fills."""
         return replace(self, view=camera)
 
-    def look(self, **fields: Any) -> Scene:
-        """The scene with other colours and lights: fields by their names."""
-        unknown = {*fields} - {*LOOK}
-        if unknown:
-            raise TypeError(f"look() has no argument {', '.join(sorted(unknown))}")
-        return replace(self, **fields)
+    def look(
+        self,
+        *,
+        color_map: ColorMap | str | None = AS_BEFORE,
+        slice_map: ColorMap | str = AS_BEFORE,
+        field: Voxels | None = AS_BEFORE,
+        background: Color | None = AS_BEFORE,
+        background_top: Color | None = AS_BEFORE,
+        transparent: bool = AS_BEFORE,
+        lights: Mapping[str, float] | None = AS_BEFORE,
+        light: Sequence[float] | None = AS_BEFORE,
+        shadow_rays: int = AS_BEFORE,
+        light_angle: float = AS_BEFORE,
+        bounce_rays: int = AS_BEFORE,
+    ) -> Scene:
+        """The scene with other colours and lights; those that are not given stay."""
+        given = {name: each for name, each in locals().items() if each is not AS_BEFORE}
+        del given["self"]
+        return replace(self, **given)
 
     def annotate(
         self, what: str | Sequence[str] = "all", *, units: str = "", title: str = ""
@@ -145,15 +166,31 @@ class Scene:
         annotations = Annotations(what, units, title)
         return replace(self, annotations=annotations if annotations.what else None)
 
-    def camera(self, **more: Any) -> Camera:
+    def camera(
+        self, *, size: tuple[int, int] = (1280, 720), device: str | int | None = None
+    ) -> Camera:
         """A view that the surfaces fill; arguments as Volume.camera()."""
-        return self.volume.camera(surfaces=self.surfaces, **more)
+        return self.volume.camera(surfaces=self.surfaces, size=size, device=device)
 
-    def render(self, **more: Any) -> Image:
+    def __repr__(self) -> str:
+        shown = [each.text for each in self.surfaces]
+        for name, things in (("slice", self.slices), ("clipping plane", self.planes)):
+            if things:
+                shown.append(f"{len(things)} {name}{'s' if len(things) > 1 else ''}")
+        return f"<isowave.Scene {'; '.join(shown) or 'empty'}>"
+
+    @takes(Renderer.render, without=("isovalue",), device=None, memory_budget=None, field=None)
+    def render(self, **more: Unpack[SceneFrame]) -> Image:
         """Draws the scene; arguments as Volume.render(), which replace those of the scene.
 
         Image.annotated() draws the annotations.
         """
+        image = self.volume.render(**self._arguments() | dict(more))
+        image.annotations = self.annotations
+        return image
+
+    def _arguments(self) -> dict[str, Any]:
+        """Arguments of Volume.render()."""
         arguments: dict[str, Any] = {
             "slices": self.slices,
             "clip": self.planes,
@@ -176,9 +213,7 @@ class Scene:
             arguments["color"] = None if by_axis else first.color
         else:
             arguments["surfaces"] = self.surfaces
-        image = self.volume.render(**arguments | more)
-        image.annotations = self.annotations
-        return image
+        return arguments
 
     def save(
         self,

@@ -5,14 +5,16 @@ from __future__ import annotations
 import os
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from isowave import _core
 from isowave._annotate import Annotations, annotations_from_core
 from isowave._camera import Camera, vector
 from isowave._clip import ClipPlane
 from isowave._color_map import ColorMap
+from isowave._compress import OpenArguments
 from isowave._compress import open as open_volume
+from isowave._handed_on import takes
 from isowave._levels import Voxels
 from isowave._request import LIGHTS
 from isowave._scene import Scene, SceneVolume
@@ -20,13 +22,17 @@ from isowave._slice import Slice
 from isowave._surface import Surface
 from isowave._volume import Volume
 
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
+
+@takes(open_volume, without=("path",))
 def open_scene(
     path: str | os.PathLike[str],
     *,
     volume: SceneVolume | None = None,
     field: Voxels | None = None,
-    **options: Any,
+    **options: Unpack[OpenArguments],
 ) -> Scene:
     """Reads a scene file, as Scene.save(), `isowave render --save-scene` and the viewer write it.
 
@@ -54,7 +60,7 @@ def open_scene(
         raise _core.Error(f"{os.fsdecode(path)}: it names no field: give field=")
     is_drawn = fields["field"] == "volume" or (volume is None and _is_volume(fields, options))
     if wants_field and not is_drawn:
-        field = open_field(fields["field"], options)
+        field = open_field(fields["field"], dict(options))
     title = ""
     if volume is None:
         if not fields["volume"]:

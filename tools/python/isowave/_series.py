@@ -8,13 +8,13 @@ import threading
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, overload
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 import numpy.typing as npt
 
 from isowave import _core
-from isowave._camera import Camera
 from isowave._checked import Isovalue, refuse, reversed_axes
 from isowave._compress import compress, compression_options, dims_of, open_source, step_of
 from isowave._files import (
@@ -25,10 +25,15 @@ from isowave._files import (
     source_of_file,
     steps_of_file,
 )
+from isowave._handed_on import takes
 from isowave._image import Image
 from isowave._request import isovalue_or_surfaces
-from isowave._surface import Surface
 from isowave._volume import Volume
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from isowave._scene import SceneFrame
 
 
 class Series(Sequence[Volume]):
@@ -59,7 +64,7 @@ class Series(Sequence[Volume]):
         steps = range(len(self))
         if isinstance(index, slice):
             chosen = steps[index]
-            return Series([self.names[i] for i in chosen], lambda i: self._load(chosen[i]))
+            return Series([self.names[i] for i in chosen], Chosen(self._load, chosen))
         return self._load(steps[index])
 
     def __iter__(self) -> Iterator[Volume]:
@@ -75,28 +80,20 @@ class Series(Sequence[Volume]):
     def __repr__(self) -> str:
         return f"<isowave.Series of {len(self)} steps>"
 
+    @takes(Volume.render)
     def render(
-        self,
-        isovalue: Isovalue | None = None,
-        *,
-        size: tuple[int, int] = (1280, 720),
-        camera: Camera | None = None,
-        surfaces: Sequence[Surface] = (),
-        device: str | int | None = None,
-        **more: Any,
+        self, isovalue: Isovalue | None = None, **frame: Unpack[SceneFrame]
     ) -> Iterator[Image]:
         """Draws each step, as Volume.render() does: a picture at a time, when it is asked for.
 
         Without a camera, all pictures have the same: the view that the volumes' box fills.
         isovalue="auto" is the first step's suggestion.
         """
-        isovalue_or_surfaces(isovalue, surfaces)
+        isovalue_or_surfaces(isovalue, frame.get("surfaces", ()))
         for volume in self:
             if isovalue is not None:
                 isovalue = volume._isovalue(isovalue)
-            yield volume.render(
-                isovalue, size=size, camera=camera, surfaces=surfaces, device=device, **more
-            )
+            yield volume.render(isovalue, **frame)
 
 
 def open_series(
@@ -115,7 +112,9 @@ def open_series(
     map_nan: float | None = None,
     no_data: float | None = None,
     num_threads: int = 0,
-    **placed: Any,
+    origin: Sequence[float] | None = None,
+    direction: npt.ArrayLike | None = None,
+    fill_value: float | None = None,
 ) -> Series:
     """Opens a series of volumes on one grid.
 
@@ -139,6 +138,8 @@ def open_series(
     """
     options = (tolerance, relative_tolerance, rate, exact, levels, map_nan, no_data, num_threads)
     checked = compression_options(*options)
+    places = {"origin": origin, "direction": direction, "fill_value": fill_value}
+    placed = {name: each for name, each in places.items() if each is not None}
     if is_path(source) or (isinstance(source, (list, tuple)) and all(map(is_path, source))):
         if placed:
             raise TypeError(f"{next(iter(placed))}: files say it themselves")
@@ -153,15 +154,16 @@ def open_series(
             return of_read_files(paths, dataset, index, spacing, checked)
         if dataset is not None:
             raise _core.Error(f"{paths[0]}: dataset {dataset}: this file has one array")
-        series = of_files(
-            _core.open_series(
-                paths,
-                checked,
-                None if shape is None else dims_of(shape),
-                None if dtype is None else np.dtype(dtype).name,
-                None if spacing is None else reversed_axes(spacing),
-            )
+        load = FileSteps(
+            paths,
+            checked,
+            None if shape is None else dims_of(shape),
+            None if dtype is None else np.dtype(dtype).name,
+            None if spacing is None else reversed_axes(spacing),
         )
+        for notice in load.core.notices:
+            warnings.warn(notice, RuntimeWarning, stacklevel=2)
+        series = Series([load.core.name(i) for i in range(load.core.size)], load)
         if index is None:
             return series
         step = step_of(paths[0], index, len(series))
@@ -173,26 +175,67 @@ def open_series(
     names = (*("tolerance", "relative_tolerance", "rate", "exact"), "levels", "map_nan", "no_data")
     how = {**dict(zip((*names, "num_threads"), options)), "spacing": spacing, **placed}
     count = int(source.shape[0])
-    return Series(
-        [f"step {i}" for i in range(count)],
-        lambda i: compress(source[i], progress=False, **how),
-    )
+    return Series([f"step {i}" for i in range(count)], ArraySteps(source, how))
+
+
+def as_absolute(path: str) -> str:
+    return path if path.startswith("generate:") else os.path.abspath(path)
 
 
 def is_path(source: Any) -> bool:
     return isinstance(source, (str, bytes, os.PathLike))
 
 
-def of_files(core: _core.Series) -> Series:
-    lock = threading.Lock()
-    for notice in core.notices:
-        warnings.warn(notice, RuntimeWarning, stacklevel=3)
+@dataclass
+class Chosen:
+    """Opens steps of another series, by its numbers."""
 
-    def load(step: int) -> Volume:
-        with lock:
-            return Volume(core.open(step))
+    load: Callable[[int], Volume]
+    steps: Sequence[int]
 
-    return Series([core.name(i) for i in range(core.size)], load)
+    def __call__(self, step: int) -> Volume:
+        return self.load(self.steps[step])
+
+
+@dataclass
+class ArraySteps:
+    """Compresses parts of an array (t, z, y, x). how: arguments of compress()."""
+
+    source: Any
+    how: dict[str, Any]
+
+    def __call__(self, step: int) -> Volume:
+        return compress(self.source[step], progress=False, **self.how)
+
+
+class FileSteps:
+    """Opens files that the compiled part reads. Pickled as arguments of _core.open_series()."""
+
+    def __init__(self, paths: Sequence[str], *arguments: Any) -> None:
+        self.paths, self.arguments = [as_absolute(path) for path in paths], arguments
+        self.core, self.lock = _core.open_series([*paths], *arguments), threading.Lock()
+
+    def __call__(self, step: int) -> Volume:
+        with self.lock:
+            return Volume(self.core.open(step))
+
+    def __reduce__(self) -> Any:
+        return FileSteps, (self.paths, *self.arguments)
+
+
+@dataclass
+class ReadSteps:
+    """Opens files that packages of Python read. steps: file, entries of its further axes."""
+
+    steps: Sequence[tuple[str, Index | None]]
+    dataset: str | None
+    spacing: Sequence[float] | None
+    options: dict[str, Any]
+
+    def __call__(self, step: int) -> Volume:
+        file, entries = self.steps[step]
+        source = source_of_file(file, self.dataset, entries, self.spacing)
+        return open_source(file, source, self.options, progress=False)
 
 
 def of_read_files(
@@ -220,11 +263,9 @@ def of_read_files(
         if grid(file, index) != first:
             raise _core.Error(f"{file}: it has another grid than {files[0]}")
 
-    def load(step: int) -> Volume:
-        _, file, entries = steps[step]
-        source = source_of_file(file, dataset, entries, spacing)
-        return open_source(file, source, options, progress=False)
-
+    load = ReadSteps(
+        [(as_absolute(file), entries) for _, file, entries in steps], dataset, spacing, options
+    )
     return Series([name for name, _, _ in steps], load)
 
 

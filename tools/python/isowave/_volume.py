@@ -9,30 +9,36 @@ import threading
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from isowave import _core, viewer
-from isowave._checked import Isovalue, flag, function, reversed_axes, whole
+from isowave._checked import Isovalue, flag, reversed_axes, whole
 from isowave._camera import Camera, turntable_of
+from isowave._handed_on import takes
 from isowave._image import Image
 from isowave._levels import Voxels
 from isowave._mesh import Mesh
+from isowave._progress import Progress, shown
 from isowave._renderer import (
     CAPABILITIES,
     Renderer,
+    RendererArguments,
     draw,
     host_renderer,
     positions_of,
     warn_of_isovalue,
 )
-from isowave._request import Request, isovalue_or_surfaces
+from isowave._request import FrameArguments, Request, isovalue_or_surfaces, request_of
 from isowave._scene import Scene
 from isowave._surface import Surface
 
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
+DEFAULT_SIZE = (1280, 720)
 NEED_LEVELS = {"levels", "bounds", "time_budget"}  # options with which levels may be drawn
 
 
@@ -95,7 +101,8 @@ class Volume(Voxels):
             self.save(path)
             return from_bytes, (path.read_bytes(),)
 
-    def renderer(self, **options: Any) -> Renderer:
+    @takes(Renderer, without=("volume",))
+    def renderer(self, **options: Unpack[RendererArguments]) -> Renderer:
         """Makes a Renderer of this volume, with Renderer's options."""
         return Renderer(self, **options)
 
@@ -144,17 +151,15 @@ class Volume(Voxels):
         """An empty scene of this volume: scene().surface(80, "bone").render()."""
         return Scene(self)
 
+    @takes(Renderer.render, size=DEFAULT_SIZE)
     def render(
         self,
         isovalue: Isovalue | None = None,
         *,
-        size: tuple[int, int] = (1280, 720),
-        camera: Camera | None = None,
         device: str | int | None = None,
         memory_budget: int | None = None,
-        surfaces: Sequence[Surface] = (),
         field: Voxels | None = None,
-        **more: Any,
+        **frame: Unpack[FrameArguments],
     ) -> Image:
         """Draws the isosurface, or several; Renderer.render has the other arguments.
 
@@ -167,20 +172,14 @@ class Volume(Voxels):
         isovalue
             The surface is where the trilinear field crosses this value. "auto": the first of
             suggested_isovalues().
-        size
-            Width and height of the picture [pixels].
-        camera
-            None: the volume's box fills the picture, Camera.of(volume).
         device, memory_budget
             As Renderer's.
-        surfaces
-            As Renderer.render's: instead of `isovalue`, up to 8 surfaces, also translucent ones.
         field
             As Renderer's: a second volume, for color_map=ColorMap(by="field"). With by="caps",
             None: this volume.
         """
-        value = self._isovalue(isovalue_or_surfaces(isovalue, surfaces))
-        request = Request(value, camera, size, surfaces=surfaces, **more)
+        value = self._isovalue(isovalue_or_surfaces(isovalue, frame.get("surfaces", ())))
+        request = request_of(value, {"size": DEFAULT_SIZE, **frame})
         return self.draw(request, device=device, memory_budget=memory_budget, field=field)
 
     def draw(
@@ -192,6 +191,8 @@ class Volume(Voxels):
         field: Voxels | None = None,
     ) -> Image:
         """Draws a frame with a size, as render()."""
+        if request.size is None:
+            request = replace(request, size=DEFAULT_SIZE)
         for option, argument in request.needs.items():
             if request.has_labels and option not in ("labels", "rays"):
                 raise _core.Error(f"labels are drawn without {argument}: leave out {argument}")
@@ -313,7 +314,7 @@ class Volume(Voxels):
         largest: int | None = None,
         device: str | int | None = None,
         memory_budget: int | None = None,
-        progress: Callable[[str, float], object] | None = None,
+        progress: bool | Progress | None = None,
     ) -> Mesh:
         """Extracts the isosurface as triangles, by marching cubes on the device.
 
@@ -345,23 +346,24 @@ class Volume(Voxels):
         memory_budget
             Most device memory to take [bytes]; None: three quarters of it.
         progress
-            Called with what extract() is doing and how much of it is done, 0 to 1.
+            As compress() has it.
         """
         if vertices not in ("apart", "exact"):
             raise ValueError(f"vertices={vertices!r:.60}: there are apart and exact")
         value = self._isovalue(isovalue)
         warn_of_isovalue(self._core, value)
-        found = self._core.extract(
-            "" if device is None else str(device),
-            value,
-            self._checked(level),
-            flag("normals", normals),
-            vertices == "exact",
-            flag("closed", closed),
-            0 if largest is None else whole("largest", largest, 2**32, least=1),
-            0 if memory_budget is None else whole("memory_budget", memory_budget, 2**64 - 1),
-            function("progress", progress),
-        )
+        with shown(progress) as told:
+            found = self._core.extract(
+                "" if device is None else str(device),
+                value,
+                self._checked(level),
+                flag("normals", normals),
+                vertices == "exact",
+                flag("closed", closed),
+                0 if largest is None else whole("largest", largest, 2**32),
+                0 if memory_budget is None else whole("memory_budget", memory_budget, 2**64 - 1),
+                told,
+            )
         places = positions_of(self, found["vertices"])
         return Mesh(places, found["faces"], found["normals"] if normals else None)
 
@@ -416,9 +418,7 @@ class Volume(Voxels):
             "hits": int(np.isfinite(image.depth).sum()),
         }
 
-    def view(self, **options: Any) -> Any:
-        """Shows the volume in a notebook's widget or a browser's tab: isowave.view()."""
-        return viewer.view(self, **options)
+    view = viewer.view
 
 
 def labels_wanted(surfaces: Sequence[Surface]) -> dict[str, Any]:

@@ -123,6 +123,7 @@ def test_arguments_reach_the_request_by_their_names(monkeypatch: pytest.MonkeyPa
         "time_budget": 4.0,
         "ambient": 5,
         "on_pass": print,
+        "progress": False,
     }
     assert [*given] == [field.name for field in dataclasses.fields(Request)][1:]
     monkeypatch.setattr(isowave.Renderer, "draw", lambda self, request: request)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import Any
 
 import httpx
 import pytest
+from conftest import FUEL
 from viewer_fakes import FakeVolume
 from viewer_sockets import HELLO, TIMEOUT, receive_until, wish_text
 from websockets.sync.client import connect
@@ -158,8 +160,33 @@ def test_a_view_that_does_not_block_is_a_server() -> None:
     server.close()
 
 
-def test_the_command_ends_with_ctrl_c(tmp_path: Path) -> None:
-    assert run_until_ctrl_c(tmp_path, "FakeVolume()") == (0, "")
+@pytest.mark.parametrize(
+    ("environment", "tells"),
+    [({"SSH_CONNECTION": "1", "DISPLAY": ":1"}, True), ({}, True), ({"DISPLAY": ":1"}, False)],
+)
+def test_it_says_how_to_look_from_another_machine(
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    environment: dict[str, str],
+    tells: bool,
+) -> None:
+    for name in ("SSH_CONNECTION", "DISPLAY", "WAYLAND_DISPLAY", "BROWSER"):
+        monkeypatch.delenv(name, raising=False)
+    for name, value in {"USER": "ada", **environment}.items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.setattr(command, "open_volume", lambda path: FakeVolume())
+    monkeypatch.setattr(server_module, "wait_and_close", lambda server: server.close())
+    monkeypatch.setattr(os, "_exit", lambda status: None)  # if a pass is at work
+    assert main(["ball.nrrd", "--no-browser"]) == 0
+    port, *rest = capsys.readouterr().out.removeprefix("http://127.0.0.1:").split("/", 1)
+    line = f"From your machine: ssh -N -L {port}:127.0.0.1:{port} ada@{socket.gethostname()}\n"
+    assert (line in rest[0]) == tells, rest
+
+
+# B1: with the compiled part's own volumes, nanobind told of leaks.
+@pytest.mark.parametrize("volume", ["FakeVolume()", f"isowave.open({str(FUEL)!r})"])
+def test_the_command_ends_with_ctrl_c(tmp_path: Path, volume: str) -> None:
+    assert run_until_ctrl_c(tmp_path, volume) == (0, "")
 
 
 @pytest.mark.parametrize("what", ["before_pass", "refuse"])
@@ -175,7 +202,7 @@ def run_until_ctrl_c(tmp_path: Path, volume: str) -> tuple[int, str]:
     """Status and errors of `isowave view`, ended when a client has wished for a picture."""
     script = tmp_path / "run.py"
     script.write_text(
-        "import sys, signal, time\n"
+        "import sys, signal, time, isowave\n"
         "from isowave.viewer import command\n"
         "from viewer_fakes import FakeVolume\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"

@@ -64,7 +64,7 @@ def test_messages_are_read() -> None:
     camera = Camera((0, 0, 5), (0, 0, 0), (0, 1, 0), 60)
     colors: dict[str, Any] = {"color": (1, 0.5, 0), "background": (1, 1, 1), "outputs": ("rgb",)}
     clip: dict[str, Any] = {"clip": [ClipPlane((0, 0.5, -1), -20)], "caps": False}
-    more: dict[str, Any] = {"max_error": 0.5, "by": "sample", "ambient": 16}
+    more: dict[str, Any] = {"max_error": 0.5, "by": "sample", "ambient": 16, "progress": False}
     asked = Request(80, camera, (64, 48), 2, **colors, **clip, **more)
     assert check(parse(json.dumps(WISH))) == Wish(7, asked)
     timed = check({**WISH, "max_error": None, "time_budget": 50})

@@ -3,6 +3,8 @@ and Voila."""
 
 from __future__ import annotations
 
+import base64
+import io
 import json
 import os
 import re
@@ -16,16 +18,17 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from viewer_fakes import PLAIN_WISH, FakeVolume
+from viewer_fakes import PLAIN_WISH, Drawn, FakeVolume
 
 import isowave
 
 pytest.importorskip("anywidget")
+pillow = pytest.importorskip("PIL.Image")
 
 from isowave.viewer import widget as widget_module  # noqa: E402
 from isowave.viewer.front_end import PARTS, script  # noqa: E402
 from isowave.viewer.protocol import VERSION  # noqa: E402
-from isowave.viewer.widget import MAX_VIEWS, Widget, show  # noqa: E402
+from isowave.viewer.widget import MAX_VIEWS, STILL_SIZE, Widget, show  # noqa: E402
 
 TIMEOUT = 60  # seconds; for machines that are busy with other things
 HELLO = {"type": "hello", "version": VERSION}
@@ -137,6 +140,69 @@ def test_widgets_of_a_volume_share_a_renderer() -> None:
     assert not widget_module._scenes
 
 
+def test_an_exported_notebook_has_the_picture(
+    front: FrontEnd, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Beside the widget, which shows nothing without a kernel."""
+    monkeypatch.setattr(widget_module, "STILL_SECONDS", TIMEOUT)
+    images = images_of(front.widget)
+    still = images["image/png"]
+    assert [*images] == ["image/png"] and still == front.widget.still
+    picture = pillow.open(io.BytesIO(still))
+    assert picture.size == STILL_SIZE
+    assert len(picture.getcolors(1 << 20)) > 2, "no ball"
+    assert front.widget._scene.num_clients == 0
+    assert images_of(front.widget) == images
+
+
+def test_a_scene_is_what_the_exported_notebook_shows() -> None:
+    volume: Any = FakeVolume()
+    scene = isowave.Scene(volume, (isowave.Surface(80, "red", 0.5), isowave.Surface(120, "blue")))
+    widget: Any = isowave.view(scene.look(background="black"), notebook=True)
+    widget._repr_mimebundle_()
+    drawn = volume.frames[-1].request
+    assert [each.isovalue for each in drawn.surfaces] == [80, 120]
+    assert (drawn.background, drawn.size) == ((0, 0, 0), STILL_SIZE)
+    widget.close()
+
+
+def images_of(widget: Widget) -> dict[str, bytes]:
+    bundle: Any = widget._repr_mimebundle_()
+    data = bundle[0] if isinstance(bundle, tuple) else bundle
+    assert "application/vnd.jupyter.widget-view+json" in data
+    return {
+        kind: base64.b64decode(each) for kind, each in data.items() if kind.startswith("image/")
+    }
+
+
+def test_a_slow_picture_does_not_keep_the_widget_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(widget_module, "STILL_SECONDS", 0.1)
+    go = threading.Event()
+    widget = show(FakeVolume(before_pass=lambda drawn: go.wait(TIMEOUT) and None), isovalue=80)
+    assert images_of(widget) == {}
+    go.set()
+    widget.close()
+
+
+def test_the_best_picture_so_far_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(widget_module, "STILL_SECONDS", TIMEOUT)
+
+    def only_small_ones(drawn: Drawn) -> None:
+        if drawn.size == STILL_SIZE:
+            raise RuntimeError("no memory")
+
+    widget = show(FakeVolume(before_pass=only_small_ones), isovalue=80)
+    (kind,) = images_of(widget)
+    assert kind == "image/jpeg"
+    widget.close()
+
+
+def test_the_kernel_says_that_it_is_there(front: FrontEnd) -> None:
+    front.say("a", "alive")
+    front.wait("a", type="alive")
+    assert not front.widget._sessions
+
+
 def test_a_widget_has_the_steps_of_a_series() -> None:
     series = isowave.Series(["a.zfp", "b.zfp"], lambda step: FakeVolume())  # type: ignore
     front = FrontEnd(series)  # type: ignore[arg-type]
@@ -155,6 +221,53 @@ def test_the_widget_carries_the_module() -> None:
     assert not re.search(r"^\s*import\b", module, re.MULTILINE)
     parts = Path(widget_module.__file__).parent.glob("*.js")
     assert {part.name for part in parts} == set(PARTS)
+
+
+#: Shows the module's widget with a model without a kernel; what it is sent is in `sent`.
+ALONE = """async ([module, still]) => {
+  const url = URL.createObjectURL(new Blob([module], { type: "text/javascript" }));
+  const { default: widget } = await import(url);
+  const bytes = Uint8Array.from(atob(still), (c) => c.charCodeAt(0));
+  window.sent = [];
+  window.heard = {};
+  const model = {
+    get: (name) => ({ height: 400, still: new DataView(bytes.buffer) })[name],
+    on: (name, act) => { heard[name] = act; }, off: () => {},
+    send: (content) => sent.push(content),
+  };
+  const el = document.body.appendChild(document.createElement("div"));
+  window.end = widget.render({ model, el });
+}"""
+
+
+def test_a_page_without_a_kernel(page: Any) -> None:
+    """Shows the picture; says that no kernel answers; nothing is red meanwhile (B11)."""
+    stream = io.BytesIO()
+    pillow.new("RGB", (96, 54), (10, 200, 30)).save(stream, "png")
+    page.goto("about:blank")
+    page.evaluate(ALONE, [script(), base64.b64encode(stream.getvalue()).decode()])
+    page.wait_for_function(
+        """() => { const canvas = document.querySelector("div").firstChild.shadowRoot
+          .querySelector("canvas.picture");
+        const [r, g, b] = canvas.getContext("2d").getImageData(48, 27, 1, 1).data;
+        return canvas.width === 96 && `${r} ${g} ${b}` === "10 200 30"; }"""
+    )
+    field = page.get_by_role("spinbutton", name="Isovalue", exact=True)
+    assert field.evaluate("e => e.matches(':invalid')")
+    color = "e => getComputedStyle(e).borderColor"
+    assert field.evaluate(color) == page.locator("[name=budget]").evaluate(color), "red"
+    note = page.locator(".note")
+    page.get_by_text("The kernel does not answer. If it is busy, pictures follow.").wait_for()
+    view, alive = page.evaluate(
+        "() => [sent[0].view, sent.filter(s => s.message === 'alive').length]"
+    )
+    assert alive == 1
+    page.evaluate("(view) => heard['msg:custom']({ view, message: { type: 'alive' } })", view)
+    assert note.is_hidden()
+    page.evaluate("() => heard['comm_live_update']()")
+    assert note.text_content() == "The kernel was restarted: run the cell again."
+    page.evaluate("() => end()")
+    assert page.evaluate("() => sent.at(-1).message") is None
 
 
 NOTEBOOK_CELL = """\
@@ -252,6 +365,13 @@ def test_in_jupyterlab(jupyter: Callable[[str], str], page: Any) -> None:
     page.keyboard.press("ArrowLeft")
     assert page.get_by_role("dialog").count() == 0
     keep_screenshot(page, "jupyterlab")
+    # B11: a kernel that is restarted leaves the view without a word.
+    page.keyboard.press("Escape")
+    page.get_by_role("menuitem", name="Kernel", exact=True).click()
+    page.get_by_role("menuitem", name="Restart Kernel…").click()  # with its keys
+    page.get_by_role("button", name="Confirm Kernel Restart").click()
+    page.get_by_text("The kernel was restarted: run the cell again.").wait_for()
+    keep_screenshot(page, "jupyterlab_restarted")
 
 
 def test_in_voila(jupyter: Callable[[str], str], page: Any) -> None:

@@ -216,7 +216,7 @@ def _argument(parse: Any) -> Any:
 def main(argv: Sequence[str] | None = None) -> int:
     """The command `isowave view`. Returns its exit status."""
     try:
-        from .server import serve, wait_and_close
+        from .server import has_display, serve, wait_and_close
     except ImportError as error:
         print(f"isowave view: {missing(error, 'view')}", file=sys.stderr)
         return 1
@@ -270,9 +270,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"isowave view: {first_line(error)}", file=sys.stderr)
         return 1
     print(f"{server.url}\nCtrl-C ends it.", flush=True)
-    if "SSH_CONNECTION" in os.environ:
+    if "SSH_CONNECTION" in os.environ or not has_display():
         way = f"{server.port}:127.0.0.1:{server.port}"
-        print(f"From your machine: ssh -N -L {way} {socket.gethostname()}", flush=True)
+        user, here = os.environ.get("USER", ""), socket.gethostname()
+        there = f"{user}@{here}" if user else here
+        print(f"From your machine: ssh -N -L {way} {there}", flush=True)
     failure = wait_and_close(server)
     if failure is not None:
         print(f"isowave view: {failure}", file=sys.stderr)

@@ -43,11 +43,34 @@ export function connect(host, url) {
   return view;
 }
 
+const SILENT_MS = 3000; // without an answer of the kernel, until a note says that
+const SILENT = "The kernel does not answer. If it is busy, pictures follow. If it was restarted, "
+  + "run the cell again.";
+const RESTARTED = "The kernel was restarted: run the cell again.";
+
+/** Shows a picture until the first one comes. */
+async function showStill(view, data) {
+  const bitmap = await createImageBitmap(new Blob([data]));
+  const { picture, shown } = view;
+  picture.style.objectFit = "contain";
+  if (shown.wish < 0) {
+    Object.assign(picture, { width: bitmap.width, height: bitmap.height });
+    picture.getContext("2d").drawImage(bitmap, 0, 0);
+  }
+  bitmap.close();
+}
+
 /** A view in a notebook: of anywidget. */
 function render({ model, el }) {
   const host = document.createElement("div");
   const name = crypto.getRandomValues(new Uint32Array(4)).join("-");
-  const send = (message) => model.send({ view: name, message });
+  let timer = 0; // runs until the kernel answers
+  const send = (message) => {
+    model.send({ view: name, message });
+    if (!message || message.type === "ack" || timer) return;
+    timer = setTimeout(() => view.note(SILENT, "silent"), SILENT_MS);
+    model.send({ view: name, message: "alive" });
+  };
   const wheel = (view) => view.root.activeElement === view.picture; // else the notebook scrolls
   const light = document.body.dataset.jpThemeLight; // JupyterLab's theme, whatever the system's
   const isDark = () => (light ? light === "false" : matchMedia(DARK).matches);
@@ -58,14 +81,22 @@ function render({ model, el }) {
   const view = new View(host, { send, wheel, hash: false, isDark });
   const receive = ({ view: to, message }, buffers) => {
     if (to !== name) return;
+    clearTimeout(timer);
+    timer = 0;
+    view.clearNote("silent");
     if (message.type !== "closed") return view.receive(message, buffers?.[0]);
     view.note(`Disconnected: ${message.message}. Run the cell again.`, "drawing");
   };
+  const restarted = () => view.note(RESTARTED, "silent");
   model.on("msg:custom", receive);
   model.on("change:height", resize);
+  model.on("comm_live_update", restarted);
+  if (model.get("still")?.byteLength) showStill(view, model.get("still"));
   view.connected();
   return () => {
     send(null);
+    clearTimeout(timer);
+    model.off("comm_live_update", restarted);
     model.off("msg:custom", receive);
     model.off("change:height", resize);
     view.close();

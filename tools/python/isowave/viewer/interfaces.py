@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,11 @@ from numpy.typing import NDArray
 from isowave._camera import Camera
 from isowave._placed import Vector
 from isowave._request import Request
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from isowave._renderer import RendererArguments
 
 
 class ImageLike(Protocol):
@@ -123,7 +128,7 @@ class VolumeLike(Protocol):
     def histogram(self, bins: int = 256) -> tuple[NDArray[Any], NDArray[Any]]:
         ...
 
-    def renderer(self, **options: Any) -> RendererLike:
+    def renderer(self, **options: Unpack[RendererArguments]) -> RendererLike:
         ...
 
 

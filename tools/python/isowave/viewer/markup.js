@@ -3,7 +3,7 @@
 const THUMB = 12; // width of the slider's thumb, CSS pixels
 
 const HTML = `
-<div class="frame">
+<div class="frame starting">
   <section class="stage" aria-label="Picture">
     <canvas class="picture" tabindex="0" role="application" aria-describedby="keys"
       aria-label="Isosurface; arrow keys turn it"></canvas>
@@ -187,7 +187,7 @@ input::placeholder { color: var(--soft); opacity: 1; }
 .panel input[type=checkbox] { margin: 0 32px 0 0; }
 input[type=color] { height: 26px; padding: 2px; border: 1px solid var(--edge);
   border-radius: 4px; background: var(--field); cursor: pointer; }
-input:invalid { border-color: var(--bad); outline-color: var(--bad); }
+.frame:not(.starting) input:invalid { border-color: var(--bad); outline-color: var(--bad); }
 textarea { width: 100%; height: auto; padding: 4px 8px; resize: vertical;
   font: 12px/1.4 ui-monospace, monospace; }
 :focus-visible { outline: 2px solid var(--accent); outline-offset: 2px; }

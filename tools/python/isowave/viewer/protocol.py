@@ -486,6 +486,7 @@ def _read_wish(content: dict[str, Any]) -> Wish:
         **_error(content),
         time_budget=None if time_budget is None else time_budget / 1000,
         ambient=_integer(content["ambient"], 0, MAX_AMBIENT, "ambient"),
+        progress=False,
     )
     step = _integer(content["step"], 0, MAX_ID, "step")
     wish_id = _integer(content["id"], 0, MAX_ID, "id")

@@ -406,4 +406,5 @@ def make_host(
         return None
     if field is None:
         return host_renderer(volume)
-    return volume.renderer(device="host", field=field)
+    of_field: Any = field
+    return volume.renderer(device="host", field=of_field)

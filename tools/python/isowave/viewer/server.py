@@ -460,10 +460,14 @@ def serve(
         raise
     server = Server(scene, host=host, port=port, listener=listener)
     # Without a display, Python would open a browser of the terminal.
-    if open_browser and any(os.environ.get(n) for n in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")):
+    if open_browser and has_display():
         url = server.url_for_once()
         threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
     return server
+
+
+def has_display() -> bool:
+    return any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER"))
 
 
 def wait_and_close(server: Server) -> str | None:

@@ -118,6 +118,7 @@ class View {
   welcome(head) {
     this.volume = head;
     this.sides = sidesOf(head.anatomical);
+    this.find(".frame").classList.remove("starting");
     const [z, y, x] = head.shape;
     this.find("h1").textContent = head.title || "Volume";
     this.find(".volume").textContent =
@@ -368,8 +369,9 @@ class View {
 
   /**
    * @param {string} text
-   * @param {"passing" | "drawing" | "error"} kind what makes it go: the device is ready; a picture
-   *    of the newest wish; the next thing that somebody does. Passing ones give way to others.
+   * @param {"passing" | "drawing" | "error" | "silent"} kind what makes it go: the device is ready;
+   *    a picture of the newest wish; the next thing that somebody does; the kernel answers. Passing
+   *    ones give way to others.
    */
   note(text, kind) {
     const note = this.find(".note");
