@@ -85,8 +85,8 @@ FrameStats TeamRenderer::render(const FrameRequest &request) {
   if (!request.surfaces.empty()) {
     draw_layers(request, stats);
   } else {
-    stats = draw_brick(
-        own, [&](const FrameRequest &of_brick) { return renderer_.render(of_brick); });
+    stats =
+        draw_brick(own, [&](const FrameRequest &of_brick) { return renderer_.render(of_brick); });
     if (light_rays_of(request).count() != 0 && !stats.cancelled) add_ambient(request, stats);
   }
   stats.complete = !stats.cancelled;

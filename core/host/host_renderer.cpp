@@ -414,8 +414,7 @@ void HostRenderer::filter_bounced(const View &view, std::span<const GivenRay> pl
 
 /// Calls draw(tile, is_alone), as HostBlocks::run() does, for the tiles of all of the frame's rays,
 /// in bands of whole rows of pixels from the top; after each band, on_pass(after(rows that are
-/// done)). Returns false if on_pass says to stop, and there is more to draw: bands,
-/// or what follows.
+/// done)). Returns false if on_pass says to stop, and there is more to draw: bands or other loops.
 template <class Draw, class After>
 bool HostRenderer::for_bands(const FrameRequest &request, Loop loop, Draw draw, After after) {
   const OnPass &on_pass = request.on_pass;
