@@ -32,7 +32,13 @@ ERRORS = {
 
 def name_of(point):
     """The name beside a point: options of `isowave render`, shortened, one or two lines."""
-    name = point["way"].replace("--device host", "host").replace(" --", ",\n").replace("--", "")
+    name = (
+        point["way"]
+        .replace("--device host", "host")
+        .replace(" --", ",\n")
+        .replace(" + ", " +\n")
+        .replace("--", "")
+    )
     return name.removesuffix(", ranges").removesuffix(" of 8 bits")
 
 
@@ -143,7 +149,7 @@ def draw(documents, stem, cost, error, save, caption):
     axes.flat[0].set_yscale("log")
     costs = [x for x, _ in values]
     axes.flat[0].set_xlim(with_margins(min(costs), max(costs), 235, 75, 12))
-    axes.flat[0].set_ylim(with_margins(least, max(positive, default=1), 155, 12, 28))
+    axes.flat[0].set_ylim(with_margins(least, max(positive, default=1), 155, 18, 28))
     figure.supxlabel(TIMES.get(cost, "MB of memory to draw"), fontsize=10, y=0.28 / size[1])
     figure.supylabel(
         f"{ERRORS[error]}, against {documents[0]['truth_rays']} rays a pixel", fontsize=10
