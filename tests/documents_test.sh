@@ -39,8 +39,9 @@ measured() { # OPTION...: into the results
 measured --only frames,normals,error,time,pareto_large,stability,sweep,paper,devices,cpus
 measured --only storage,sizes,detail,solvers,pareto,topology --volumes "$top/tests/data"
 tables=(frames normals error time cpus stability leaks storage sizes detail solvers
-  solver_frames pareto pareto_ways pareto_large
-  pareto_large_ways topology paper_claims paper_stand_ins paper_passes paper_times
+  solver_frames pareto pareto_ways pareto_spans
+  pareto_large pareto_large_ways pareto_large_spans topology
+  paper_claims paper_stand_ins paper_passes paper_times
   paper_published_passes paper_published_memory paper_progress paper_utilisation paper_scanned
   paper_limits paper_working_set paper_memory paper_blocks paper_scaling by_device)
 if [ -x "$programs/bench/peer_bench" ]; then

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
 
 #include "core/base/error.hpp"
 #include "core/stages/march_packets.hpp"
@@ -299,6 +300,62 @@ TEST_P(TimeBudgetOnDevice, NoTimeIsRefused) {
   EXPECT_THROW(TimedRenderer{plain}, Error);
   plain.render({camera_, kIsovalue});
   EXPECT_THROW(plain.keep_picture(), Error);
+}
+
+/// A picture of each width takes a time that does not grow as its pixels do, as on a GPU: a whole
+/// picture that has time behind the smallest one is drawn from the second frame on. If it once took
+/// too long, it is tried again later.
+TEST_P(TimeBudgetOnDevice, AWholePictureThatHasTimeIsDrawn) {
+  using Times = std::map<std::uint32_t, double>;
+  class SlowPictures : public RendererAround {
+   public:
+    SlowPictures(Renderer &inner, double &now, const Times &times)
+        : RendererAround(inner), now_(now), times_(times) {}
+    /// Three quarters of the time go to the first pass, the rest to the second.
+    FrameStats render(const FrameRequest &request) override {
+      FrameRequest slow = request;
+      const double whole_ms = times_.at(request.size->width);
+      double pass_ms = 0.75 * whole_ms;
+      slow.on_pass = [&](const PassStats &pass) {
+        now_ += pass_ms;
+        pass_ms = pass_ms > 0.5 * whole_ms ? 0.25 * whole_ms : 0;
+        return request.on_pass(pass);
+      };
+      return inner().render(slow);
+    }
+
+   private:
+    double &now_;
+    const Times &times_;
+  };
+  double now = 0;
+  Times times{{4, 0.9}, {7, 1.1}, {14, 1.6}, {27, 3.1}};
+  SlowPictures slow(renderer_, now, times);
+  TimedRenderer frames(slow, [&now] { return now; });
+  const auto draw = [&](double budget_ms) {
+    return frames.render(within_ms(budget_ms, {camera_, kIsovalue}));
+  };
+  EXPECT_FALSE(draw(5).complete) << "how long it takes is not known yet";
+  for (int i = 0; i < 3; ++i) {
+    const FrameStats frame = draw(5);
+    EXPECT_TRUE(frame.complete);
+    EXPECT_EQ(frame.steps.size(), 2u);
+    EXPECT_LE(frame.total_ms, 4.0 + 1e-9);
+  }
+  EXPECT_EQ(draw(6.3).steps.size(), 1u) << "there is time for it twice";
+  EXPECT_LE(draw(3.5).total_ms, 3.5);
+  times[27] = 8;
+  renderer_.clear_cache();
+  EXPECT_FALSE(draw(5).complete);
+  times[27] = 3.1;
+  EXPECT_LE(draw(5.6).total_ms, 5.6) << "it is not tried again at once";
+  bool is_complete = false;
+  for (int i = 0; i < 20 && !is_complete; ++i) {
+    const FrameStats frame = draw(5.6);
+    is_complete = frame.complete;
+    EXPECT_LE(frame.total_ms, 5.6);
+  }
+  EXPECT_TRUE(is_complete);
 }
 
 /// The first picture of an isovalue is the smallest; later frames begin with what has time twice.

@@ -12,6 +12,10 @@ namespace {
 
 /// Number of pixels of a step for each pixel of the step before.
 constexpr double kGrowth = 4;
+/// A step takes this many times as long as the step before, at least. Fewer would be noise.
+constexpr double kLeastGrowth = 1.25;
+/// What a guess is multiplied by from frame to frame, so that it is tried again some time.
+constexpr double kGuessDecay = 0.9;
 
 /// Adds a step's statistics to those of the steps before.
 void add(FrameStats &sum, FrameStats step) {
@@ -61,6 +65,7 @@ FrameStats TimedRenderer::render(const FrameRequest &request) {
   const double fetch_ms = fetch_ms_;
   const double begin = now_ms(), end = begin + *request.time_budget_ms - fetch_ms;
   FrameStats sum;
+  for (std::size_t i = 0; i < kNumSteps; ++i) last_ms_[i] *= is_guess_[i] ? kGuessDecay : 1;
   std::size_t step = first_step(request.isovalue, end - begin);
   isovalue_ = request.isovalue;
   for (double step_begin = begin;;) {
@@ -74,7 +79,7 @@ FrameStats TimedRenderer::render(const FrameRequest &request) {
     sum.steps.push_back({*of_step.size, of_step.voxel_pixels, step_ms,
                          least_percent(team(), stats.passes.back().completed_percent),
                          stats.cancelled});
-    if (!drawn.is_stopped) last_ms_[step] = is_whole ? step_ms : 2 * step_ms;
+    if (!drawn.is_stopped) remember(step, sum.steps.back(), drawn);
     if (!has_all_hits && !is_first) fill_from_kept();
     add(sum, std::move(drawn.stats));
     sum.cancelled = drawn.is_stopped;
@@ -82,8 +87,7 @@ FrameStats TimedRenderer::render(const FrameRequest &request) {
     if (step == 0) break;
     keep_picture();
     if (drawn.is_stopped) break;
-    const std::size_t next =
-        is_whole ? next_step(step, step_ms, drawn.first_pass_ms, end - now) : step;
+    const std::size_t next = is_whole ? next_step(step, drawn.first_pass_ms, end - now) : step;
     if (next == step) break;
     step = next;
     step_begin = now;
@@ -108,17 +112,33 @@ TimedRenderer::Drawn TimedRenderer::draw_step(const FrameRequest &request, std::
   FrameRequest in_time = request_of(request, step);
   in_time.on_progress = {};
   double pass_begin = begin_ms;
-  // Further passes have fewer rays, so the next one mostly takes no longer than the last.
+  // Further passes have fewer rays, so the next one mostly takes no longer than the last, or than
+  // what the whole picture is expected to take from now on.
   in_time.on_pass = [&](const PassStats &pass) {
-    const double now = now_ms(), pass_ms = now - pass_begin;
-    if (drawn.first_pass_ms == 0) drawn.first_pass_ms = pass_ms;
+    const double now = now_ms(), pass_ms = now - pass_begin, drawn_ms = now - begin_ms;
+    if (drawn.first_pass_ms == 0) {
+      drawn.first_pass_ms = pass_ms;
+      const bool is_known = last_ms_[step] > 0 && !is_guess_[step];
+      drawn.expected_ms = is_known ? last_ms_[step] : whole_per_first_pass_ * pass_ms;
+    }
+    if (drawn_ms >= drawn.expected_ms) drawn.expected_ms = drawn_ms + pass_ms;
+    const double left_ms = std::min(pass_ms, drawn.expected_ms - drawn_ms);
     drawn.is_stopped = request.on_pass && !request.on_pass(pass);
     pass_begin = now;
-    return !drawn.is_stopped && (is_first || now + pass_ms <= end_ms);
+    return !drawn.is_stopped && (is_first || now + left_ms <= end_ms);
   };
   drawn.stats = inner().render(in_time);
   drawn.is_stopped = any_of(team(), drawn.is_stopped);
   return drawn;
+}
+
+/// Learns from a step, from what all ranks know alike. If rays were left when its time was over,
+/// how many passes they take is unknown.
+void TimedRenderer::remember(std::size_t step, const TimedStep &timed, const Drawn &drawn) {
+  is_guess_[step] = timed.cancelled && timed.completed_percent < 100;
+  last_ms_[step] = !timed.cancelled ? timed.ms : is_guess_[step] ? 2 * timed.ms : drawn.expected_ms;
+  if (!timed.cancelled && drawn.first_pass_ms > 0)
+    whole_per_first_pass_ = timed.ms / drawn.first_pass_ms;
 }
 
 /// Throws Error before anything is drawn.
@@ -147,26 +167,37 @@ FrameRequest TimedRenderer::request_of(const FrameRequest &request, std::size_t 
   return smaller;
 }
 
-/// The step to begin with: a picture of another isovalue takes longer than the last, so the
-/// smallest.
-std::size_t TimedRenderer::first_step(float isovalue, double left_ms) const {
-  std::size_t step = kNumSteps - 1;
-  if (isovalue_ != isovalue) return step;
-  for (std::size_t finer = step; finer-- > 0;) {
-    if (last_ms_[finer] > 0 && last_ms_[finer] <= left_ms / 2) step = finer;
-  }
-  return step;
+/// Time of a step by earlier frames [ms]; 0: unknown. A step that was never drawn takes as much
+/// more than the step before as it has more pixels, beside what any picture takes: the steps before
+/// tell how much that is.
+double TimedRenderer::expected_ms(std::size_t step) const {
+  if (last_ms_[step] > 0 || step + 1 == kNumSteps) return last_ms_[step];
+  const double before = expected_ms(step + 1);
+  const bool knows_two = step + 2 < kNumSteps && last_ms_[step + 1] > 0 && last_ms_[step + 2] > 0;
+  if (!knows_two) return kGrowth * before;
+  return std::clamp(before + kGrowth * (before - last_ms_[step + 2]), kLeastGrowth * before,
+                    kGrowth * before);
 }
 
-/// After a step that took step_ms, and its first pass first_pass_ms: the step to draw in left_ms,
-/// or `step` if there is no time.
-std::size_t TimedRenderer::next_step(std::size_t step, double step_ms, double first_pass_ms,
-                                     double left_ms) const {
+/// The step to begin with: a picture of another isovalue takes longer than the last, so the
+/// smallest. The first picture cannot be cancelled, so there must be time for it twice.
+std::size_t TimedRenderer::first_step(float isovalue, double left_ms) const {
+  constexpr std::size_t kSmallest = kNumSteps - 1;
+  if (isovalue_ != isovalue) return kSmallest;
+  for (std::size_t step = 0; step < kSmallest; ++step) {
+    if (is_guess_[step]) continue;
+    if (last_ms_[step] > 0 && last_ms_[step] <= left_ms / 2) return step;
+    if (last_ms_[kSmallest] + expected_ms(step) <= left_ms) return kSmallest;
+  }
+  return kSmallest;
+}
+
+/// After a step, whose first pass took first_pass_ms: the step to draw in left_ms, or `step` if
+/// there is no time.
+std::size_t TimedRenderer::next_step(std::size_t step, double first_pass_ms, double left_ms) const {
   std::size_t next = step;
-  double expected = step_ms;
   for (std::size_t finer = step; finer-- > 0;) {
-    expected = last_ms_[finer] > 0 ? last_ms_[finer] : kGrowth * expected;
-    if (expected <= left_ms) next = finer;
+    if (expected_ms(finer) <= left_ms) next = finer;
   }
   // A part of a better picture is better than none.
   if (next == step && step > 0 && kGrowth * first_pass_ms <= left_ms) next = step - 1;

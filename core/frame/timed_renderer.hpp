@@ -36,9 +36,10 @@ class TimedRenderer : public RendererAround {
   Abilities abilities() const override;
 
   /// Draws a first picture, however long that takes: the smallest one, or for further frames of an
-  /// isovalue the largest one that last took at most half of the time. Each further step draws the
-  /// largest picture that is expected to be whole in time, by the times of earlier frames. If a
-  /// picture is not whole in time, the picture before fills it. The hit buffer then holds a picture
+  /// isovalue the largest one that last took at most half of the time, unless a larger one than
+  /// that is expected to be whole in time behind the smallest. Each further step draws the largest
+  /// picture that is expected to be whole in time, by the times of earlier frames. If a picture is
+  /// not whole in time, the picture before fills it. The hit buffer then holds a picture
   /// of the full size. The request's on_pass is called after each pass, while the renderer has a
   /// picture of the step's size. If it returns false, the frame ends, even in the smallest picture.
   ///
@@ -59,6 +60,7 @@ class TimedRenderer : public RendererAround {
   struct Drawn {
     FrameStats stats;
     double first_pass_ms = 0;
+    double expected_ms = 0;  ///< of the whole picture, as it seemed after the last pass
     bool is_stopped = false;
   };
 
@@ -68,14 +70,19 @@ class TimedRenderer : public RendererAround {
   FrameRequest request_of(const FrameRequest &request, std::size_t step) const;
   Drawn draw_step(const FrameRequest &request, std::size_t step, bool is_first, double begin_ms,
                   double end_ms);
+  void remember(std::size_t step, const TimedStep &timed, const Drawn &drawn);
+  double expected_ms(std::size_t step) const;
   std::size_t first_step(float isovalue, double left_ms) const;
-  std::size_t next_step(std::size_t step, double step_ms, double first_pass_ms,
-                        double left_ms) const;
+  std::size_t next_step(std::size_t step, double first_pass_ms, double left_ms) const;
 
   Clock now_;
   bool levels_pay_ = false;  ///< at rank 0, for this frame: all ranks must decide alike
-  /// Time of each step when it was drawn last [ms]; 0: unknown.
+  /// Time of each step when it was drawn last [ms]; 0: unknown. If it was not whole, a guess.
   std::array<double, kNumSteps> last_ms_{};
+  std::array<bool, kNumSteps> is_guess_{};
+  /// Time of a whole picture for each millisecond of its first pass, in the last step that was
+  /// whole.
+  double whole_per_first_pass_ = 1;
   std::optional<float> isovalue_{};  ///< of the last frame
   double fetch_ms_ = 0;              ///< time of the last fetch() after a frame
 };

@@ -468,6 +468,18 @@ def pareto_ways(rows):
         )
 
 
+def pareto_spans(rows):
+    """The factors from one end of a front to the other, of time and FLIP, and of wrong pixels."""
+    yield "volume, isovalue", "time", "FLIP", "wrong pixels"
+    for row in rows:
+        factors = []
+        for name, error in (("next_ms", "flip"), ("flip", "flip"), ("wrong_pixels",) * 2):
+            front = front_of(row["points"], "next_ms", error)
+            least, most = (pick(point[name] for point in front) for pick in (min, max))
+            factors.append(f"{most / least:,.0f}" if least > 0 else "")
+        yield (of_size(row), *factors)
+
+
 def topology(rows):
     yield (
         "volume, isovalue",
@@ -501,6 +513,10 @@ def pareto_large_ways(rows):
     yield from pareto_ways(rows)
 
 
+def pareto_large_spans(rows):
+    yield from pareto_spans(rows)
+
+
 # Name of a table -> (section of the JSON, table).
 TABLES = {
     table.__name__: (section, table)
@@ -531,8 +547,8 @@ TABLES = {
         ("sizes", sizes),
         ("detail", detail),
         ("solvers", solvers, solver_frames),
-        ("pareto", pareto, pareto_ways),
-        ("pareto_large", pareto_large, pareto_large_ways),
+        ("pareto", pareto, pareto_ways, pareto_spans),
+        ("pareto_large", pareto_large, pareto_large_ways, pareto_large_spans),
         ("topology", topology),
     )
     for table in tables

@@ -1,28 +1,44 @@
 """Charts of speed against accuracy: what `isowave bench pareto` writes, a panel for each volume.
 
 Every point is one way to draw. The front is what no other way beats in both; it is drawn and named.
-The rest is grey. Ways of other programs (peers) are blue and named, and the default is black.
+The rest is grey. Ways of other programs (peers) are blue and named, and the default is black. Texts
+are as large as a page that shows the chart 600 pixels wide needs.
 """
 
+import math
+
+import matplotlib.patheffects
 import matplotlib.pyplot as plt
 import matplotlib.ticker
 
 from measuring.fronts import front_of, volume_title
 
 FRONT, OTHERS, PEERS, DEFAULT = "#D55E00", "#BBBBBB", "#0072B2", "#333333"
+KEY = ((0.02, "left", "orange: what nothing beats", FRONT),)
+KEY += ((0.5, "center", "blue squares: other programs", PEERS),)
+KEY += ((0.98, "right", "grey: all other ways", "#777777"),)
+NAME_POINTS, LINE_POINTS = 8.5, 9.5
+# Around each name, so that lines and points behind it leave it readable.
+HALO = [matplotlib.patheffects.withStroke(linewidth=2, foreground="white")]
 TIMES = {
     "next_ms": "ms from camera to picture, one degree further",
     "cold_ms": "ms to the first picture of an isovalue",
 }
 ERRORS = {
     "flip": "error (FLIP)",
-    "wrong_pixels": "wrong pixels, part of all",
+    "wrong_pixels": "wrong pixels, %",
 }
 
 
 def name_of(point):
-    """The name beside a point: options of `isowave render`, shortened."""
-    name = point["way"].replace("--device host", "host").replace("--", "")
+    """The name beside a point: options of `isowave render`, shortened, one or two lines."""
+    name = (
+        point["way"]
+        .replace("--device host", "host")
+        .replace(" --", ",\n")
+        .replace(" + ", " +\n")
+        .replace("--", "")
+    )
     return name.removesuffix(", ranges").removesuffix(" of 8 bits")
 
 
@@ -33,29 +49,40 @@ def spread_names(axis, front, cost, error):
     last = None
     for point in front:
         at = (axis.transScale.transform((1, point[error]))[1] - low) / (high - low) * height
-        text_at = at - 3 if last is None else min(at - 3, last - 7)
-        last = text_at
+        name = name_of(point)
+        half = (name.count("\n") + 1) * LINE_POINTS / 2
+        text_at = at - 3 if last is None else min(at - 3, last - half)
+        last = text_at - half
         axis.annotate(
-            name_of(point),
+            name,
             (point[cost], point[error]),
             xytext=(-5, text_at - at),
             textcoords="offset points",
-            fontsize=6.5,
+            fontsize=NAME_POINTS,
+            linespacing=1.0,
             ha="right",
             va="center",
             color=FRONT,
+            path_effects=HALO,
+            zorder=5,
         )
 
 
 def name_beside(axis, point, cost, error, color, above):
+    """To the right, or to the left of points near the panel's right end."""
+    at = axis.transAxes.inverted().transform(axis.transData.transform((point[cost], point[error])))
+    is_left = at[0] > 0.8
     axis.annotate(
         name_of(point),
         (point[cost], point[error]),
-        xytext=(3, above),
+        xytext=(-3 if is_left else 3, above),
         textcoords="offset points",
-        fontsize=6.5,
+        ha="right" if is_left else "left",
+        fontsize=NAME_POINTS,
         va="center",
         color=color,
+        path_effects=HALO,
+        zorder=5,
     )
 
 
@@ -73,11 +100,11 @@ def draw_panel(axis, document, cost, error, least):
     for number, point in enumerate(sorted(peers, key=lambda point: point[cost])):
         axis.plot(point[cost], point[error], "s", color=PEERS, markersize=4, zorder=3)
         if point["way"] not in names:  # by turns above and below
-            name_beside(axis, point, cost, error, PEERS, 7 if number % 2 == 0 else -7)
+            name_beside(axis, point, cost, error, PEERS, 9 if number % 2 == 0 else -9)
     for point in points:
         if point["way"] == "default" and "default" not in names:
             axis.plot(point[cost], point[error], "o", color=DEFAULT, markersize=4, zorder=4)
-            name_beside(axis, point, cost, error, DEFAULT, 15)
+            name_beside(axis, point, cost, error, DEFAULT, 20)
     axis.plot(
         [point[cost] for point in front],
         [point[error] for point in front],
@@ -91,8 +118,18 @@ def draw_panel(axis, document, cost, error, least):
     return front
 
 
+def with_margins(low, high, length, before, after):
+    """Ends of a logarithmic axis of `length` points, with room for names beside its values."""
+    per_point = math.log(high / low) / (length - before - after)
+    return low * math.exp(-before * per_point), high * math.exp(after * per_point)
+
+
 def plain(value, _=None):
     return f"{value:g}"
+
+
+def percent(value, _=None):
+    return f"{100 * value:g}"
 
 
 def draw(documents, stem, cost, error, save, caption):
@@ -102,7 +139,7 @@ def draw(documents, stem, cost, error, save, caption):
     least = min(positive, default=1) / (2 if len(positive) < len(values) else 1)
     columns = min(2, len(documents))
     rows = -(-len(documents) // columns)
-    size = (3.9 * columns + 0.3, 3.0 * rows + 0.9)
+    size = (3.6 * columns + 0.4, 2.7 * rows + 0.8)
     figure, axes = plt.subplots(
         rows, columns, figsize=size, squeeze=False, sharex=True, sharey=True
     )
@@ -111,25 +148,30 @@ def draw(documents, stem, cost, error, save, caption):
     axes.flat[0].set_xscale("log")
     axes.flat[0].set_yscale("log")
     costs = [x for x, _ in values]
-    axes.flat[0].set_xlim(min(costs) / 5, max(costs) * 2.5)
-    axes.flat[0].set_ylim(least / 1.5, 1.5 * max(positive, default=1))
-    figure.supxlabel(TIMES.get(cost, "MB of memory to draw"), fontsize=9, y=0.05)
+    axes.flat[0].set_xlim(with_margins(min(costs), max(costs), 235, 75, 12))
+    axes.flat[0].set_ylim(with_margins(least, max(positive, default=1), 155, 18, 28))
+    figure.supxlabel(TIMES.get(cost, "MB of memory to draw"), fontsize=10, y=0.28 / size[1])
     figure.supylabel(
-        f"{ERRORS[error]}, against {documents[0]['truth_rays']} rays a pixel", fontsize=9
+        f"{ERRORS[error]}, against {documents[0]['truth_rays']} rays a pixel", fontsize=10
     )
     width, height = documents[0]["size"]
-    text = f"{caption(documents[0])}; {width} x {height}, medians of {documents[0]['views']} views"
-    figure.text(0.5, 0.012, text, ha="center", fontsize=6, color="#555555")
+    views = " or ".join(str(number) for number in sorted({d["views"] for d in documents}))
+    text = f"{caption(documents[0])}; {width} x {height}, medians of {views} views"
+    figure.text(0.5, 0.08 / size[1], text, ha="center", fontsize=7, color="#555555")
+    for x, side, words, color in KEY:
+        y = 1 - 0.2 / size[1]
+        figure.text(x, y, words, ha=side, fontsize=NAME_POINTS, weight="bold", color=color)
     fronts = []
     for axis, document in zip(axes.flat, documents):
         axis.grid(True, which="major", color="#E5E5E5", linewidth=0.6)
         axis.set_axisbelow(True)
-        axis.tick_params(labelsize=7, labelbottom=True)
+        axis.tick_params(labelsize=8.5, labelbottom=True)
         axis.xaxis.set_major_formatter(matplotlib.ticker.FuncFormatter(plain))
-        axis.yaxis.set_major_formatter(matplotlib.ticker.FuncFormatter(plain))
-        axis.set_title(volume_title(document), fontsize=9)
+        shown = percent if error == "wrong_pixels" else plain
+        axis.yaxis.set_major_formatter(matplotlib.ticker.FuncFormatter(shown))
+        axis.set_title(volume_title(document), fontsize=10)
         fronts.append((axis, draw_panel(axis, document, cost, error, least)))
-    figure.tight_layout(rect=(0.01, 0.06, 1, 1))
+    figure.tight_layout(rect=(0.01, 0.45 / size[1], 1, 1 - 0.25 / size[1]))
     for axis, front in fronts:
         spread_names(axis, front, cost, error)
     save(figure, stem)
