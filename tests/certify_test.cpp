@@ -405,7 +405,7 @@ TEST_P(CertifyOnDevice, RefusesWhatIsNotKnown) {
   EXPECT_NO_THROW(certify_with(volume, {.size = kSmall, .with_bounds = true}));
   EXPECT_THAT(
       [&] { certify_with(volume, {.size = kSmall, .with_levels = true, .with_bounds = true}); },
-      ThrowsMessage<Error>(HasSubstr("--levels")));
+      ThrowsMessage<Error>(HasSubstr("with its levels")));
   volume = scene.volume;
   volume.value_range = {-INFINITY, INFINITY};
   EXPECT_THAT([&] { certify_with(volume, {.size = kSmall, .with_bounds = true}); },

@@ -231,7 +231,7 @@ TEST_F(CliRanks, WithinAnError) {
   const auto warning = [](const ProgramResult &result) {
     return result.err.substr(result.err.find("warning"));
   };
-  EXPECT_NE(one.err.find("a volume converted with --tolerance"), std::string::npos) << one.err;
+  EXPECT_NE(one.err.find("a volume compressed with a tolerance"), std::string::npos) << one.err;
   EXPECT_EQ(warning(two), warning(one));
 }
 

@@ -110,7 +110,7 @@ isowave::FrameRequest FrameOfMany::request() const {
     const fs::path name =
         fs::path(options.progress_dir) / fmt::format("pass{:04}.png", progress.passes());
     const Image8 image = image_of(progress.size(), progress.picture());
-    if (!image.pixels.empty()) write_png(image, path(name));
+    if (!image.pixels.empty()) write_png(image, path(name), camera_text());
     return true;
   };
   return request;
