@@ -25,8 +25,10 @@ struct BounceInput : RaysRig {
     rays.open_counts = {device, "open ambient rays", 2 * rays.num_rays};
     rays.bounced = {device, "bounced light", ISO_LAYER_SUMS * rays.num_rays};
     rays.bounced_next = {device, "bounced light, next", ISO_LAYER_SUMS * rays.num_rays};
-    static constexpr LayerParams kOneSurface{.surfaces = {{1, 0.5f, 0.25f, 1}}, .num_surfaces = 1};
-    layers.write({&kOneSurface, 1});
+    LayerParams one_surface{};
+    one_surface.surfaces[0] = {1, 0.5f, 0.25f, 1};
+    one_surface.num_surfaces = 1;
+    layers.write({&one_surface, 1});
     nothing_met.write(std::vector<HitRecord>(rays.num_rays, no_hit()));
     VolumeInfo info;
     info.dims = {params.grid.dims_x, params.grid.dims_y, params.grid.dims_z};
