@@ -191,6 +191,19 @@ class LayerLight {
   std::vector<Caster> casters_;
 };
 
+/// All layers of each ray.
+std::vector<RayColor> blended(const FrameParams &frame, const Shading &shading,
+                              const LayerParams &params, const LitLayers &layers) {
+  std::vector<RayColor> colors(layers.front().size(), clear_ray());
+  for (const std::vector<LitHit> &layer : layers) {
+    for (uint ray = 0; ray < colors.size(); ++ray)
+      colors[ray] =
+          blend_hit(&frame, &shading.params, shading.color_map.data(), &params, ray, layer[ray].hit,
+                    layer[ray].value, layer[ray].light, colors[ray]);
+  }
+  return colors;
+}
+
 /// rays_cut is left out.
 LayerStats stats_of(const std::vector<std::vector<HitRecord>> &layers) {
   LayerStats stats;
@@ -297,13 +310,7 @@ LayeredFrame Twin::render_layers(const FrameRequest &request, const FieldTwin *f
   });
   if (light_rays.bounces) {
     lights.filter(frames[0], colors, lit);
-    result.colors.assign(num_rays, clear_ray());
-    for (const std::vector<LitHit> &layer : lit) {
-      for (uint ray = 0; ray < num_rays; ++ray)
-        result.colors[ray] =
-            blend_hit(frames.data(), &shading.params, shading.color_map.data(), &colors, ray,
-                      layer[ray].hit, layer[ray].value, layer[ray].light, result.colors[ray]);
-    }
+    result.colors = blended(frames[0], shading, colors, lit);
   }
   result.stats = stats_of(result.layers);
   result.stats.rays_cut = static_cast<std::uint64_t>(std::ranges::count(cut, 1));

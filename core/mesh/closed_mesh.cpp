@@ -97,6 +97,7 @@ struct ClosedMesh::Caps {
     }
     if (!all_inside) return;
     std::vector<CapCorner> around;
+    around.reserve(corners.size());
     for (const Corner &corner : corners) around.push_back(vertex(corner.voxel, axis, upper));
     add_fan(around);
   }

@@ -477,8 +477,7 @@ void add_render_options(CLI::App &command, RenderArgs &options) {
       "use the scalar C++ reference instead of a device or the host; options that say how a device "
       "draws then have no effect");
   command.get_option("--orbit")->description(
-      "number of views around the whole volume, about --up, 20 degrees above its middle [one "
-      "view]");
+      "number of views around the volume, about --up, 20 degrees above its middle [one view]");
   group_render_options(command);
 }
 

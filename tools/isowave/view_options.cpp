@@ -21,6 +21,7 @@ constexpr std::array<std::pair<const char *, Side>, 7> kSides{{{"front", Side::k
 
 std::vector<std::string> names_of_sides() {
   std::vector<std::string> names;
+  names.reserve(kSides.size());
   for (const auto &[name, side] : kSides) names.emplace_back(name);
   return names;
 }
