@@ -197,9 +197,8 @@ std::vector<RayColor> blended(const FrameParams &frame, const Shading &shading,
   std::vector<RayColor> colors(layers.front().size(), clear_ray());
   for (const std::vector<LitHit> &layer : layers) {
     for (uint ray = 0; ray < colors.size(); ++ray)
-      colors[ray] =
-          blend_hit(&frame, &shading.params, shading.color_map.data(), &params, ray, layer[ray].hit,
-                    layer[ray].value, layer[ray].light, colors[ray]);
+      colors[ray] = blend_hit(&frame, &shading.params, shading.color_map.data(), &params, ray,
+                              layer[ray].hit, layer[ray].value, layer[ray].light, colors[ray]);
   }
   return colors;
 }
