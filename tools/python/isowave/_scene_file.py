@@ -58,7 +58,7 @@ def open_scene(
     wants_field = field is None and fields["color_by_field"]
     if wants_field and not fields["field"]:
         raise _core.Error(f"{os.fsdecode(path)}: it names no field: give field=")
-    is_drawn = fields["field"] == "volume" or (volume is None and _is_volume(fields, options))
+    is_drawn = fields["field"] == "volume" or (volume is None and _is_volume(fields, dict(options)))
     if wants_field and not is_drawn:
         field = open_field(fields["field"], dict(options))
     title = ""
