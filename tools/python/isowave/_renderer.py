@@ -525,6 +525,7 @@ class Renderer:
                 put(error)
             put(None)
 
+        self._check_turn()
         value = self.volume._isovalue(isovalue_or_surfaces(isovalue, frame.get("surfaces", ())))
         asked = request_of(value, frame)
         if asked.on_pass is not None or asked.progress:
