@@ -213,7 +213,7 @@ def test_surfaces_without_memory_are_refused_and_the_others_drawn() -> None:
     assert len(eye.of_type("error")) == 2
 
 
-def test_no_bounds_of_several_surfaces_are_asked_for() -> None:
+def test_bounds_of_several_surfaces_are_asked_for() -> None:
     volume, clock = FakeVolume(), Clock()
     scene = make_scene(volume, clock)
     eye = Eye(scene)
@@ -224,4 +224,4 @@ def test_no_bounds_of_several_surfaces_are_asked_for() -> None:
         clock.now += 10
     run(scene)
     assert [stage for _, stage in eye.pictures] == ["first", "whole", "lossless"]
-    assert eye.of_type("bounds") == [] and eye.of_type("error") == []
+    assert len(eye.of_type("bounds")) == 1 and eye.of_type("error") == []
