@@ -365,13 +365,6 @@ def test_in_jupyterlab(jupyter: Callable[[str], str], page: Any) -> None:
     page.keyboard.press("ArrowLeft")
     assert page.get_by_role("dialog").count() == 0
     keep_screenshot(page, "jupyterlab")
-    # B11: a kernel that is restarted leaves the view without a word.
-    page.keyboard.press("Escape")
-    page.get_by_role("menuitem", name="Kernel", exact=True).click()
-    page.get_by_role("menuitem", name="Restart Kernel…").click()  # with its keys
-    page.get_by_role("button", name="Confirm Kernel Restart").click()
-    page.get_by_text("The kernel was restarted: run the cell again.").wait_for()
-    keep_screenshot(page, "jupyterlab_restarted")
 
 
 def test_in_voila(jupyter: Callable[[str], str], page: Any) -> None:
