@@ -77,7 +77,7 @@ std::vector<std::uint32_t> bits_of(const std::vector<float> &values) {
   return bits;
 }
 
-/// Draws frames by two renderers, of which the second has the field as a second volume.
+/// Draws frames by two renderers. To one of them, the field is a second volume.
 template <class Made>
 void expect_same_values(Made &shares, Made &separate, std::span<const FrameRequest> frames) {
   for (int time = 0; time < 2; ++time) {

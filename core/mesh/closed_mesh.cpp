@@ -123,7 +123,7 @@ struct ClosedMesh::Caps {
     return found->second;
   }
 
-  /// The mesh's vertex between two voxels of which the second is inside.
+  /// The mesh's vertex between a voxel that is inside and one that is not, in any order.
   CapCorner crossing(const Corner &a, const Corner &b) {
     const bool a_is_lower = glm::all(glm::lessThanEqual(a.voxel, b.voxel));
     const Corner &lower = a_is_lower ? a : b, &higher = a_is_lower ? b : a;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <limits>
 #include <numeric>
 #include <span>
 #include <vector>
@@ -50,22 +49,9 @@ void keep_largest(Mesh &mesh, std::uint64_t count) {
   std::ranges::stable_sort(parts, [&](auto a, auto b) { return areas[a] > areas[b]; });
   std::vector<bool> stays(mesh.vertices.size());
   for (const std::uint32_t part : std::span(parts).first(count)) stays[part] = true;
-  constexpr std::uint32_t kGone = std::numeric_limits<std::uint32_t>::max();
-  std::vector<std::uint32_t> numbers(mesh.vertices.size(), kGone);
-  std::uint32_t next = 0;
-  for (std::size_t vertex = 0; vertex < numbers.size(); ++vertex) {
-    if (!stays[lowest[vertex]]) continue;
-    mesh.vertices[next] = mesh.vertices[vertex];
-    if (!mesh.normals.empty()) mesh.normals[next] = mesh.normals[vertex];
-    numbers[vertex] = next++;
-  }
-  mesh.vertices.resize(next);
-  if (!mesh.normals.empty()) mesh.normals.resize(next);
   std::erase_if(mesh.triangles,
-                [&](const Triangle &triangle) { return numbers[triangle[0]] == kGone; });
-  for (Triangle &triangle : mesh.triangles) {
-    for (std::uint32_t &vertex : triangle) vertex = numbers[vertex];
-  }
+                [&](const Triangle &triangle) { return !stays[lowest[triangle[0]]]; });
+  drop_unused_vertices(mesh);
 }
 
 }  // namespace isowave::core

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace isowave::core {
 
@@ -18,6 +19,26 @@ void Mesh::add(const MeshPart &part) {
   vertices.insert(vertices.end(), part.vertices.begin(), part.vertices.end());
   normals.insert(normals.end(), part.normals.begin(), part.normals.end());
   triangles.insert(triangles.end(), part.triangles.begin(), part.triangles.end());
+}
+
+void drop_unused_vertices(Mesh &mesh) {
+  constexpr std::uint32_t kUnused = std::numeric_limits<std::uint32_t>::max();
+  std::vector<std::uint32_t> numbers(mesh.vertices.size(), kUnused);
+  for (const Triangle &triangle : mesh.triangles) {
+    for (const std::uint32_t vertex : triangle) numbers[vertex] = 0;
+  }
+  std::uint32_t next = 0;
+  for (std::size_t vertex = 0; vertex < numbers.size(); ++vertex) {
+    if (numbers[vertex] == kUnused) continue;
+    mesh.vertices[next] = mesh.vertices[vertex];
+    if (!mesh.normals.empty()) mesh.normals[next] = mesh.normals[vertex];
+    numbers[vertex] = next++;
+  }
+  mesh.vertices.resize(next);
+  if (!mesh.normals.empty()) mesh.normals.resize(next);
+  for (Triangle &triangle : mesh.triangles) {
+    for (std::uint32_t &vertex : triangle) vertex = numbers[vertex];
+  }
 }
 
 MeshPlacement::MeshPlacement(const VolumeInfo &info, VertexPlaces places)

@@ -58,6 +58,9 @@ struct Mesh : MeshSink {
   void add(const MeshPart &part) override;
 };
 
+/// Takes out vertices without a triangle. The others keep their order.
+void drop_unused_vertices(Mesh &mesh);
+
 /// From the index space of a volume to the world.
 class MeshPlacement {
  public:

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 #include <vector>
 
 #include "core/base/error.hpp"
@@ -43,27 +42,6 @@ void check_changes(const MeshChanges &changes, VertexPlaces places) {
 #ifdef ISOWAVE_HAS_MESHOPTIMIZER
 
 namespace {
-
-/// Takes out vertices without a triangle.
-void drop_unused(Mesh &mesh) {
-  constexpr std::uint32_t kUnused = std::numeric_limits<std::uint32_t>::max();
-  std::vector<std::uint32_t> numbers(mesh.vertices.size(), kUnused);
-  for (const Triangle &triangle : mesh.triangles) {
-    for (const std::uint32_t vertex : triangle) numbers[vertex] = 0;
-  }
-  std::uint32_t next = 0;
-  for (std::size_t vertex = 0; vertex < numbers.size(); ++vertex) {
-    if (numbers[vertex] == kUnused) continue;
-    mesh.vertices[next] = mesh.vertices[vertex];
-    if (!mesh.normals.empty()) mesh.normals[next] = mesh.normals[vertex];
-    numbers[vertex] = next++;
-  }
-  mesh.vertices.resize(next);
-  if (!mesh.normals.empty()) mesh.normals.resize(next);
-  for (Triangle &triangle : mesh.triangles) {
-    for (std::uint32_t &vertex : triangle) vertex = numbers[vertex];
-  }
-}
 
 /// The ends of edges that two triangles run along in the same way.
 std::vector<bool> ends_of_shared_edges(const std::vector<Triangle> &triangles,
@@ -134,7 +112,7 @@ SimplifiedMesh simplify(Mesh &mesh, double share) {
   result.after = mesh.triangles.size();
   result.error =
       double{error} * double{meshopt_simplifyScale(&places[0].x, places.size(), sizeof(glm::vec3))};
-  drop_unused(mesh);
+  drop_unused_vertices(mesh);
   return result;
 }
 

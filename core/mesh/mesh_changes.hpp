@@ -13,7 +13,7 @@ namespace isowave::core {
 
 struct MeshChanges {
   bool closed = false;        ///< see ClosedMesh
-  std::uint64_t largest = 0;  ///< keeps so many parts, the largest; 0: all
+  std::uint64_t largest = 0;  ///< number of parts that are kept, the largest; 0: all
   double simplify = 1;        ///< share of the triangles that is wanted, (0,1]; 1: all
 
   /// The whole mesh is in memory.

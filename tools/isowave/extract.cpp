@@ -214,8 +214,9 @@ void add_extract(CLI::App &app) {
                     "closes the surface by flat caps in the faces of the volume's box, as printers "
                     "want it");
   command
-      ->add_option("--largest", options->changes.largest,
-                   "keeps so many parts of the surface, those with the largest areas [all]")
+      ->add_option(
+          "--largest", options->changes.largest,
+          "number of parts of the surface that are kept, those with the largest areas [all]")
       ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 32));
   command
       ->add_option("--simplify", options->changes.simplify,
