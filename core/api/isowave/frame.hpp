@@ -174,7 +174,7 @@ struct FrameRequest {
   /// ray are drawn (FrameStatistics::rays_cut). Empty: the surface of `isovalue` alone, opaque, in
   /// appearance.surface. A device needs RendererOptions::with_surfaces. Not with bound,
   /// voxel_pixels, max_image_error and time_budget_ms. Errors are those of a ray's first hit,
-  /// whatever its opacity; labels and slices have none.
+  /// whatever its opacity. That of a slice is rounding alone. Labels have no errors.
   std::vector<Surface> surfaces{};
   /// Slices beside `surfaces`, or beside that of `isovalue`: up to 8 with the surfaces, blended
   /// with them, with their conditions. A slice counts as a crossing, is in front of a surface at

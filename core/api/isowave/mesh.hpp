@@ -29,8 +29,8 @@ struct ExtractOptions {
   /// Closes the mesh by flat caps in the faces of the volume's box, as if values lay below the
   /// isovalue all around it: for printing, and volumes. Not with voxels without data and kExact.
   bool closed = false;
-  /// Keeps so many parts of the mesh, those with the largest areas; parts hang together by common
-  /// vertices. 0: all. This and simplify take memory for the whole mesh.
+  /// Number of parts of the mesh that are kept, those with the largest areas. 0: all. Parts hang
+  /// together by common vertices. This and simplify take memory for the whole mesh.
   std::uint64_t largest = 0;
   /// About this share of the triangles is left, (0,1], by meshoptimizer; more if the error would be
   /// a tenth of the mesh. Vertices that are left stay in place, and closed meshes closed. 1: all.

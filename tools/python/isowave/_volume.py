@@ -339,7 +339,7 @@ class Volume(Voxels):
             Closes the surface by flat caps in the faces of the volume's box, as printers want it:
             as if values lay below the isovalue all around. Not with voxels without data.
         largest
-            Keeps so many parts of the surface, those with the largest areas. None: all.
+            Number of parts of the surface that are kept, those with the largest areas. None: all.
         device
             "gpu", "cpu", an index, or a part of a name; None: $ISOWAVE_DEVICE, else the first GPU,
             else an OpenCL device for the CPU.
