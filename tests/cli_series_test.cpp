@@ -180,6 +180,61 @@ TEST_F(CliSeries, CompressedStepsAreDrawnAsTheyAre) {
                         "is compressed already");
 }
 
+/// --index takes one volume of a file with a fourth axis, in each command.
+TEST_F(CliSeries, AnIndexIsOneVolumeOfAFile) {
+  const std::string four = in("four.nrrd") + " --index t=3 ", alone = in("b3_16x16x16_uint8.raw");
+  run(draw(four, "-i 60 -o " + in("i.png")));
+  run(draw(alone, "-i 60 -o " + in("a.png")));
+  EXPECT_EQ(bytes("i.png"), bytes("a.png"));
+  run(draw(pattern(), "-i 60 --steps 10 -o " + in("last.png")));
+  EXPECT_NE(bytes("a.png"), bytes("last.png")) << "else the steps are not told apart";
+  run("convert " + four + "-o " + in("i.zfp"));
+  run("convert " + alone + " -o " + in("a.zfp"));
+  EXPECT_EQ(bytes("i.zfp"), bytes("a.zfp"));
+  const auto info = [&](const std::string &volume) {
+    json found = json::parse(run("info --json " + volume).out);
+    for (const char *of_file : {"file", "file_bytes"}) found.erase(of_file);
+    return found;
+  };
+  EXPECT_EQ(info(four), info(alone));
+  EXPECT_NE(info(four), info(in("b4_16x16x16_uint8.raw")));
+  run("extract --device cpu " + four + "-i 60 -o " + in("i.ply"));
+  run("extract --device cpu " + alone + " -i 60 -o " + in("a.ply"));
+  EXPECT_EQ(bytes("i.ply"), bytes("a.ply"));
+  const std::string same = run("compare " + four + in("four.nrrd") + " -i 60 --size 32x24").out;
+  EXPECT_THAT(same, HasSubstr("equal: all bits of 4096 voxels"));
+  // The field of a surface has an index of its own.
+  for (const auto &[field, name] : {std::pair{in("four.nrrd") + ",90,140 --field-index t=10", "f"},
+                                    std::pair{in("b10_16x16x16_uint8.raw") + ",90,140", "g"},
+                                    std::pair{in("four.nrrd") + ",90,140", "own"}})
+    run(draw(four, "-i 60 --color-by " + field + " -o " + in(name + std::string(".png"))));
+  EXPECT_EQ(bytes("f.png"), bytes("g.png"));
+  EXPECT_NE(bytes("f.png"), bytes("own.png"));
+}
+
+TEST_F(CliSeries, AnIndexThatCannotBeIsOneLine) {
+  const std::string out = " -o " + in("p.zfp");
+  const auto convert = [&](const std::string &volume) { return "convert " + volume + out; };
+  expect_one_line_error(convert(in("four.nrrd")), "a series of 11 steps; choose one by index");
+  expect_one_line_error(convert(in("four.nrrd") + " --index t=11"),
+                        "step 11 of a file that has 11");
+  for (const char *index : {"3", "t=", "t=x", "t=-1", "c=1", "t=1,c=0", "t=4294967296"})
+    expect_one_line_error(convert(in("four.nrrd") + " --index " + index),
+                          std::string("--index ") + index + ": give t=N, counted from 0");
+  const std::string one = in("b3_16x16x16_uint8.raw");
+  run("convert " + one + " -o " + in("v.zfp"));
+  for (const std::string &volume : {one, std::string("generate:sphere_8x8x8_uint8")})
+    expect_one_line_error(convert(volume + " --index t=1"),
+                          "index t=1: it is one volume: leave the index out");
+  for (const char *command : {"info ", "render --device host ", "extract --device cpu "})
+    expect_one_line_error(command + in("v.zfp") + " --index t=2", "index t=2: it is one volume");
+  run("info " + in("v.zfp") + " --index t=0");
+  expect_one_line_error(draw(in("four.nrrd"), "-i 60 --index t=1 --steps 0:2"),
+                        "VOLUME is no series");
+  expect_one_line_error(draw(one, "-i 60 --field-index t=1"),
+                        "--field-index: no file's values colour the surface");
+}
+
 TEST_F(CliSeries, WhatCannotBeIsOneLineAndLeavesNothing) {
   const std::size_t before = folder_.num_files();
   const auto refused = [&](const std::string &volume, const std::string &options,

@@ -312,7 +312,7 @@ TEST_F(NrrdFile, RefusedHeaders) {
   expect_refused("a.nrrd", sizes("4000000000", "3 4 5"), "dimension");
 }
 
-TEST_F(DetachedFile, MissingSeveralOrNoFiles) {
+TEST_F(DetachedFile, MissingOrNoFiles) {
   const std::string header =
       "NRRD0001\ndatafile: ./a.raw\ndimension: 3\nsizes: 3 4 5\nspacings: 1 2 3\ntype: "
       "uchar\nencoding: "
@@ -330,15 +330,7 @@ TEST_F(DetachedFile, MissingSeveralOrNoFiles) {
                  R"(its data file '\x1b[1m\xff.raw': no such file)");
   expect_refused("a.nhdr", nrrd("encoding: raw\ndata file: Sch\u00e4del.raw\n"),
                  "its data file 'Sch\u00e4del.raw': no such file");
-  for (const char *names :
-       {"data file: slice%03d.raw 1 5 1\n", "data file: LIST\na.raw\nb.raw\n",
-        "data file: LIST 2\na.raw\n", "data file:  LIST \t\n\na.raw\n", "datafile: LIST\na.raw\n",
-        "DATA FILE: LIST\r\na.raw\r\n", "data file: LIST"})
-    expect_refused("a.nhdr", nrrd("encoding: raw\n" + std::string(names)), "several files");
-  std::string meta = meta_image("");
-  for (const char *name : {"LIST", "slice%03d.raw 1 5 1"}) {
-    expect_refused("a.mhd", meta.substr(0, meta.size() - 6) + name + "\n", "several files");
-  }
+  const std::string meta = meta_image("");
   expect_read("a.mhd", meta.substr(0, meta.size() - 6) + "a.raw\n");
   ASSERT_EQ(::mkfifo((folder_ / "pipe.raw").c_str(), 0600), 0);
   expect_refused("a.nhdr", nrrd("encoding: raw\ndata file: pipe.raw\n"),

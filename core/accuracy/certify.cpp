@@ -10,6 +10,7 @@
 #include "core/base/error.hpp"
 #include "core/base/ms_since.hpp"
 #include "core/base/parallel_for.hpp"
+#include "core/base/text.hpp"
 #include "core/frame/surfaces.hpp"
 #include "core/view/detail.hpp"
 #include "core/zfp/level_bounds.hpp"
@@ -219,9 +220,9 @@ bool is_uncertain_beside_gaps(const FrameParams &frame, const NoData &no_data, B
 void check_gaps(const NoData &no_data, std::size_t coarsest) {
   if (no_data.empty() || coarsest == 0) return;
   throw Error(
-      "{} voxels have no data: the error of coarser levels of detail has no bound beside them, "
+      "{} {} no data: the error of coarser levels of detail has no bound beside them, "
       "leave out the distance between voxels",
-      no_data.num_voxels());
+      no_data.num_voxels(), plural(no_data.num_voxels(), "voxel has", "voxels have"));
 }
 
 /// A bit for each ray: whether says(values of the levels, ray).

@@ -121,6 +121,7 @@ core::RawOverrides to_overrides(const RawFile &raw) {
   if (raw.dims) overrides.dims = to_uvec3(*raw.dims);
   if (raw.type) overrides.type = core_type(*raw.type);
   if (raw.spacing) overrides.spacing = to_glm(*raw.spacing);
+  overrides.step = raw.step;
   return overrides;
 }
 

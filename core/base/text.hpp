@@ -18,6 +18,12 @@ inline std::string lower_case(std::string_view text) {
   return result;
 }
 
+/// The word for that many of something: plural(1, "ray", "rays").
+template <class Count>
+std::string_view plural(Count count, std::string_view one, std::string_view many) {
+  return count == Count{1} ? one : many;
+}
+
 /// The whole text as a number in decimal, of any type that std::from_chars() knows: no blanks, no
 /// plus; NaN and infinities by name. Nothing if it is none, or does not fit the type.
 template <class Number>

@@ -138,6 +138,7 @@ CompressedVolume compress_brick(const OpenReader &open, std::string_view what,
 std::vector<VolumeInfo> read_levels(const std::string &path, const RawOverrides &overrides) {
   if (!is_zfp_name(path)) return {open_any_volume(path, overrides)->info()};
   if (overrides.dims || overrides.type) throw Error("{}: dims and type are for raw files", path);
+  check_has_step(path, overrides.step);
   CompressedVolume volume = read_zfp_file_info(path);
   if (overrides.spacing) set_spacing(volume, *overrides.spacing);
   check_volume_info(volume.info, path);

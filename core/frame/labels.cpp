@@ -1,6 +1,7 @@
 #include "core/frame/labels.hpp"
 
 #include "core/base/error.hpp"
+#include "core/base/text.hpp"
 
 namespace isowave::core {
 
@@ -20,8 +21,9 @@ void check_labels(const CompressedVolume &volume) {
   if (!volume.precision.is_reversible() && !volume.precision.whole_numbers)
     throw Error("the volume was compressed with a loss, and labels are exact: compress it without");
   if (!volume.no_data.empty())
-    throw Error("{} voxels have no data, and each voxel has a label: give no value for them",
-                volume.no_data.num_voxels());
+    throw Error("{} {} no data, and each voxel has a label: give no value for them",
+                volume.no_data.num_voxels(),
+                plural(volume.no_data.num_voxels(), "voxel has", "voxels have"));
   const auto [least, most] = volume.value_range;
   if (!(least >= 0 && most < float{ISO_NUM_LABELS}))
     throw Error("the volume's values, {} to {}, are no labels: labels are 0 to {}", least, most,

@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "core/base/error.hpp"
+#include "core/base/text.hpp"
 #include "core/frame/ambient_rays.hpp"
 #include "core/view/detail.hpp"
 
@@ -141,8 +142,10 @@ void check(const FrameRequest &request, const Abilities &abilities) {
                           ? std::string("this renderer draws one opaque surface alone: leave out "
                                         "surfaces, or draw on the host, or on a device by a "
                                         "renderer that was made with_surfaces")
-                          : fmt::format("this renderer was made for {} surfaces, and {} are given",
-                                        abilities.most_surfaces, request.surfaces.size()));
+                          : fmt::format("this renderer was made for {} {}, and {} are given",
+                                        abilities.most_surfaces,
+                                        plural(abilities.most_surfaces, "surface", "surfaces"),
+                                        request.surfaces.size()));
   const bool has_labels = !request.surfaces.empty() && !request.surfaces.front().labels.empty();
   need(has_labels, abilities.labels, kDrawsNoLabels);
   need(!has_labels, abilities.isosurfaces, kDrawsLabelsAlone);

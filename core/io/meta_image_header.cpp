@@ -4,6 +4,7 @@
 #include <array>
 #include <initializer_list>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "core/base/error.hpp"
@@ -66,7 +67,9 @@ bool is_meta_key(std::string_view key, const std::string &what) {
   return false;
 }
 
-void read_meta_fields(HeaderLines &lines, const std::string &what, HeaderFields &fields) {
+/// Returns the names of data files, if there are several.
+std::optional<VoxelFileNames> read_meta_fields(HeaderLines &lines, const std::string &what,
+                                               HeaderFields &fields) {
   constexpr std::size_t kLongestKey = 255;
   while (lines.next()) {
     const std::string_view line = lines.line();
@@ -80,7 +83,7 @@ void read_meta_fields(HeaderLines &lines, const std::string &what, HeaderFields 
     if (!is_meta_key(key, what)) continue;
     if (lines.is_cut()) throw Error("{}: broken header: '{}' is too long", what, key);
     fields.add(key, trim(line.substr(at + 1)));
-    if (key == kLastMetaKey) return;
+    if (key == kLastMetaKey) return read_voxel_file_names(fields, key, lines);
   }
   throw Error("{}: broken header: no '{}'", what, kLastMetaKey);
 }
@@ -147,7 +150,8 @@ std::size_t read_meta_dims(const HeaderFields &fields, const std::string &what, 
   }
   if (num_axes < 3 ||
       std::any_of(sizes.begin() + 3, sizes.end(), [](std::int64_t size) { return size != 1; })) {
-    throw Error("{}: an image of {} axes, need a volume of 3", what, num_axes);
+    throw Error("{}: an image of {} {}, need a volume of 3", what, num_axes,
+                plural(num_axes, "axis", "axes"));
   }
   for (int i = 0; i < 3; ++i) info.dims[i] = std::uint32_t(sizes[std::size_t(i)]);
   return std::size_t(num_axes);
@@ -244,7 +248,7 @@ VolumeHeader read_meta_image_header(const std::shared_ptr<const InputFile> &file
   const std::string &what = file->what();
   HeaderLines lines(file);
   HeaderFields fields(what);
-  read_meta_fields(lines, what, fields);
+  std::optional<VoxelFileNames> files = read_meta_fields(lines, what, fields);
 
   VolumeHeader header;
   VoxelLayout &voxels = header.voxels;
@@ -257,10 +261,11 @@ VolumeHeader read_meta_image_header(const std::shared_ptr<const InputFile> &file
   if (lower_case(name) == "local") {
     voxels.file = file;
     set_meta_offset(fields, lines.end(), voxels);
-  } else if (name.starts_with("LIST") || name.find('%') != name.npos) {
-    throw Error(
-        "{}: its voxels lie in several files, which is not supported: convert it to one file",
-        what);
+  } else if (files) {
+    voxels.file = file;
+    voxels.files = std::make_shared<const VoxelFiles>(
+        file, std::move(*files), fields.integers("DimSize", num_axes), kLastMetaKey);
+    set_meta_offset(fields, 0, voxels);
   } else {
     if (name.empty()) fields.fail(kLastMetaKey, "need a file's name or LOCAL");
     voxels.file = open_data_file(*file, name);

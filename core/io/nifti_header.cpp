@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "core/base/error.hpp"
+#include "core/base/text.hpp"
 #include "core/io/byte_source.hpp"
 
 namespace isowave::core {
@@ -115,7 +116,9 @@ void read_nifti_dims(const NiftiHeader &header, VolumeHeader &result) {
       is_volume = false;
     }
   }
-  if (!is_volume) header.fail("an image of {} axes, need a volume of 3", num_axes);
+  if (!is_volume)
+    header.fail("an image of {} {}, need a volume of 3", num_axes,
+                plural(num_axes, "axis", "axes"));
   constexpr std::int16_t kMatrixIntent = 1004;
   if (header.get<std::int16_t>(68) == kMatrixIntent)
     header.fail("matrices as voxels are not supported");

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "core/base/error.hpp"
@@ -74,19 +75,12 @@ void check_nrrd_magic(HeaderLines &lines, const std::string &what) {
   }
 }
 
-/// Whether the format takes the name for a pattern or a list of files.
-bool names_several_files(std::string_view name) {
-  if (name.starts_with("LIST")) return true;
-  for (std::size_t at = name.find('%'); at != name.npos; at = name.find('%', at + 1)) {
-    const std::size_t end = name.find_first_not_of("0123456789", at + 1);
-    if (end != name.npos && name[end] == 'd') return true;
-  }
-  return false;
-}
-
 /// Reads up to the empty line after which voxels begin, or to the end of the file. Returns whether
 /// the line was there.
-bool read_nrrd_fields(HeaderLines &lines, const std::string &what, HeaderFields &fields) {
+///
+/// files  gets the names of data files, if there are several
+bool read_nrrd_fields(HeaderLines &lines, const std::string &what, HeaderFields &fields,
+                      std::optional<VoxelFileNames> &files) {
   check_nrrd_magic(lines, what);
   while (lines.next()) {
     const std::string_view line = lines.line();
@@ -97,13 +91,8 @@ bool read_nrrd_fields(HeaderLines &lines, const std::string &what, HeaderFields 
         colon == line.npos ? std::string_view() : field_name(line.substr(0, colon));
     if (!name.empty()) {
       if (lines.is_cut()) throw Error("{}: broken header: '{}' is too long", what, name);
-      const std::string_view value = trim(line.substr(colon + 2));
-      if (name == "data file" && names_several_files(value)) {  // a list goes on to the file's end
-        throw Error(
-            "{}: its voxels lie in several files, which is not supported: convert it to one file",
-            what);
-      }
-      fields.add(name, value);
+      fields.add(name, trim(line.substr(colon + 2)));
+      if (name == "data file") files = read_voxel_file_names(fields, name, lines);
     } else if (line.find(":=") == line.npos) {
       throw Error("{}: broken header: line {}, {}, is neither a field of NRRD nor a key/value pair",
                   what, lines.number(), quote(line));
@@ -301,11 +290,13 @@ std::vector<NrrdAxis> volume_axes(const HeaderFields &fields, std::vector<NrrdAx
       num_steps = std::uint32_t(axis.size);
     } else if (axis.size != 1) {
       if (!axis.is_domain()) throw Error("{}: {} components per voxel, need 1", what, axis.size);
-      throw Error("{}: an image of {} axes, need a volume of 3", what, axes.size());
+      throw Error("{}: an image of {} {}, need a volume of 3", what, axes.size(),
+                  plural(axes.size(), "axis", "axes"));
     }
   }
   if (chosen.size() != 3)
-    throw Error("{}: an image of {} axes, need a volume of 3", what, axes.size());
+    throw Error("{}: an image of {} {}, need a volume of 3", what, axes.size(),
+                plural(axes.size(), "axis", "axes"));
   return chosen;
 }
 
@@ -423,11 +414,13 @@ VolumeHeader read_nrrd_header(const std::shared_ptr<const InputFile> &file) {
   const std::string &what = file->what();
   HeaderLines lines(file);
   HeaderFields fields(what);
-  const bool has_end = read_nrrd_fields(lines, what, fields);
+  std::optional<VoxelFileNames> files;
+  const bool has_end = read_nrrd_fields(lines, what, fields, files);
 
   VolumeHeader header;
   std::uint32_t num_steps = 1;
-  const std::vector<NrrdAxis> axes = volume_axes(fields, read_nrrd_axes(fields), what, num_steps);
+  const std::vector<NrrdAxis> all_axes = read_nrrd_axes(fields);
+  const std::vector<NrrdAxis> axes = volume_axes(fields, all_axes, what, num_steps);
   for (int i = 0; i < 3; ++i) header.info.dims[i] = std::uint32_t(axes[std::size_t(i)].size);
   if (const std::optional<NrrdSpace> space = read_nrrd_space(fields)) {
     set_geometry_in_space(fields, axes, *space, what, header);
@@ -442,7 +435,12 @@ VolumeHeader read_nrrd_header(const std::shared_ptr<const InputFile> &file) {
   voxels.encoding = nrrd_encoding(fields);
   set_nrrd_byte_order(fields, voxels);
   set_nrrd_skips(fields, voxels);
-  if (fields.has("data file")) {
+  if (files) {
+    std::vector<std::int64_t> sizes(all_axes.size());
+    std::ranges::transform(all_axes, sizes.begin(), &NrrdAxis::size);
+    voxels.file = file;
+    voxels.files = std::make_shared<const VoxelFiles>(file, std::move(*files), sizes, "data file");
+  } else if (fields.has("data file")) {
     voxels.file = open_data_file(*file, fields["data file"]);
   } else {
     if (!has_end)

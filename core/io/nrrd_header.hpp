@@ -3,8 +3,7 @@
 //
 // Comments and key/value pairs may be anything. All other lines must be fields of the format, each
 // at most once, with values that are understood to their end. Refused, besides what is broken:
-// voxels in several files, bzip2, blocks, 64-bit integers, more than one value per voxel, spaces of
-// other than 3 dimensions.
+// bzip2, blocks, more than one value per voxel, spaces of other than 3 dimensions.
 
 #include <memory>
 

@@ -1,6 +1,7 @@
 #include "core/io/open_volume.hpp"
 
 #include <algorithm>
+#include <functional>
 #include <initializer_list>
 #include <string>
 #include <string_view>
@@ -57,10 +58,13 @@ std::optional<VolumeHeader> read_header(const std::shared_ptr<const InputFile> &
 
 }  // namespace
 
-std::filesystem::path voxel_file(const fs::path &path) {
-  const auto file = std::make_shared<const InputFile>(path);
-  const std::optional<VolumeHeader> header = read_header(file);
-  return header ? header->voxels.file->path() : path;
+void visit_voxel_files(const fs::path &path, const std::function<void(const fs::path &)> &visit) {
+  const std::optional<VolumeHeader> header = read_header(std::make_shared<const InputFile>(path));
+  if (!header) return visit(path);
+  visit(header->voxels.file->path());
+  const VoxelFiles *files = header->voxels.files.get();
+  for (std::uint64_t i = 0; files != nullptr && i < files->size(); ++i)
+    visit(files->open(i)->path());
 }
 
 std::optional<std::uint32_t> num_steps(const fs::path &path) {
@@ -69,12 +73,20 @@ std::optional<std::uint32_t> num_steps(const fs::path &path) {
   return header->voxels.num_steps;
 }
 
+void check_has_step(const fs::path &path, std::optional<std::uint32_t> step) {
+  if (step.value_or(0) > 0)
+    throw Error("{}: index t={}: it is one volume: leave the index out", path.string(), *step);
+}
+
 std::unique_ptr<VolumeReader> open_volume(const fs::path &path, const RawOverrides &overrides,
                                           std::optional<std::uint32_t> step) {
   if (fs::is_directory(path)) refuse_kind(path);
   const auto file = std::make_shared<const InputFile>(path);
-  if (has_ending(path, {".raw", ".raw.gz"}))
+  if (!step) step = overrides.step;
+  if (has_ending(path, {".raw", ".raw.gz"})) {
+    check_has_step(path, step);
     return open_raw(file, has_ending(path, {".gz"}), overrides);
+  }
   std::optional<VolumeHeader> header = read_header(file);
   if (!header) refuse_kind(path);
   if (overrides.dims || overrides.type) {
@@ -85,9 +97,12 @@ std::unique_ptr<VolumeReader> open_volume(const fs::path &path, const RawOverrid
   check_volume_info(header->info, path.string());
   VoxelLayout &voxels = header->voxels;
   if (!step && voxels.num_steps > 1)
-    throw Error("{}: an image of 4 axes, need a volume of 3: it is a series of {} steps",
-                path.string(), voxels.num_steps);
+    throw Error(
+        "{}: an image of 4 axes, need a volume of 3: it is a series of {} steps; choose one by "
+        "index, as t=0",
+        path.string(), voxels.num_steps);
   voxels.step = step.value_or(0);
+  if (voxels.num_steps == 1) check_has_step(path, step);
   if (voxels.step >= voxels.num_steps)
     throw Error("{}: step {} of a file that has {}: count from 0", path.string(), voxels.step,
                 voxels.num_steps);

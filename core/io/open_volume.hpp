@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 
@@ -19,7 +20,7 @@ namespace isowave::core {
 ///         that is not understood, zero dims, truncated or oversized data, more than one component;
 ///         there is no such step
 ///
-/// step  of a file with a fourth axis; none: the file must have one volume
+/// step  of a file with a fourth axis; none: that of the overrides, or the file's only volume
 std::unique_ptr<VolumeReader> open_volume(const std::filesystem::path &path,
                                           const RawOverrides &overrides = {},
                                           std::optional<std::uint32_t> step = {});
@@ -27,9 +28,12 @@ std::unique_ptr<VolumeReader> open_volume(const std::filesystem::path &path,
 ///
 /// Throws  Error: it has no header that is understood
 std::optional<std::uint32_t> num_steps(const std::filesystem::path &path);
-/// The file that has the voxels: the one that the volume's header names, or else the volume's own.
+/// Visits the files that have the voxels: those that the volume's header names, or else its own.
 ///
 /// Throws  Error as open_volume()
-std::filesystem::path voxel_file(const std::filesystem::path &path);
+void visit_voxel_files(const std::filesystem::path &path,
+                       const std::function<void(const std::filesystem::path &)> &visit);
+/// Throws  Error: a step, other than the first, of a file that has one volume
+void check_has_step(const std::filesystem::path &path, std::optional<std::uint32_t> step);
 
 }  // namespace isowave::core

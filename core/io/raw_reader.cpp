@@ -184,8 +184,8 @@ std::uint64_t find_begin(const VolumeHeader &header) {
     do {
       c = characters.next();
       if (!c)
-        throw Error("{}: truncated: {} lines to skip, found {}", file->what(), voxels.lines_to_skip,
-                    line);
+        throw Error("{}: truncated: {} {} to skip, found {}", file->what(), voxels.lines_to_skip,
+                    plural(voxels.lines_to_skip, "line", "lines"), line);
       ++begin;
     } while (*c != '\n');
   }
@@ -213,6 +213,118 @@ void check_size(const VolumeHeader &header, std::uint64_t found) {
   fail_size(header.info, voxels, found < least ? "truncated" : "too long",
             fmt::format("{}{}", is_raw ? "" : "at least ", least), fmt::format("{}", found));
 }
+
+/// A source, and the bytes of it that stand before the voxels.
+struct OpenedFile {
+  std::unique_ptr<ByteSource> source;
+  std::uint64_t to_skip = 0;
+};
+
+/// before: bytes of voxels that are left out at the begin
+OpenedFile open_file(const VolumeHeader &header, std::uint64_t before) {
+  const VoxelLayout &voxels = header.voxels;
+  const std::shared_ptr<const InputFile> &file = voxels.file;
+  const std::uint64_t begin = find_begin(header);
+  check_size(header, file->size() - begin);
+  const std::uint64_t packed_before =
+      before + (is_compressed(voxels.encoding) ? voxels.bytes_to_skip : 0);
+  switch (voxels.encoding) {
+    case VoxelEncoding::kRaw:
+      return {std::make_unique<FileSource>(file, begin + before)};
+    case VoxelEncoding::kGzip:
+      return {std::make_unique<InflateSource>(FileSource(file, begin), Packing::kGzip),
+              packed_before};
+    case VoxelEncoding::kGzipOrZlib:
+      return {std::make_unique<InflateSource>(FileSource(file, begin), Packing::kGzipOrZlib),
+              packed_before};
+    case VoxelEncoding::kHex:
+      return {std::make_unique<HexSource>(file, begin), packed_before};
+    case VoxelEncoding::kText:
+      return {std::make_unique<NumberSource>(file, begin, voxels.type), packed_before};
+  }
+  throw std::invalid_argument("open_file: no such encoding");
+}
+
+/// The voxels of VoxelLayout::files, one file after the other. Refuses a file that does not end
+/// with its voxels.
+class FilesSource : public ByteSource {
+ public:
+  /// Looks at all files.
+  ///
+  /// before  bytes of voxels that are left out at the begin
+  FilesSource(const VolumeHeader &header, std::uint64_t before) : part_(header) {
+    VoxelLayout &voxels = part_.voxels;
+    bytes_each_ = voxels.files->voxels_each() * size_of(voxels.type);
+    voxels.step = 0;
+    set_part_dims();
+    for (std::uint64_t i = 0; i < voxels.files->size(); ++i) open_part(i);
+    next_file_ = before / bytes_each_;
+    to_skip_ = before % bytes_each_;
+  }
+
+  /// Bytes of this source before the first voxel that is wanted.
+  std::uint64_t to_skip() const { return to_skip_; }
+
+  std::size_t read(std::span<std::byte> bytes) override {
+    std::size_t done = 0;
+    while (done < bytes.size()) {
+      if (left_ == 0 && !begin_next_file()) break;
+      const auto count = std::size_t(std::min<std::uint64_t>(bytes.size() - done, left_));
+      if (opened_.source->read(bytes.subspan(done, count)) < count) fail("truncated");
+      done += count;
+      left_ -= count;
+      if (left_ == 0) check_file_end();
+    }
+    return done;
+  }
+
+ private:
+  /// The grid and steps of a file, for messages and the check of its size.
+  void set_part_dims() {
+    const std::uint64_t count = part_.voxels.files->voxels_each();
+    const glm::uvec3 dims = part_.info.dims;
+    const std::uint64_t row = dims.x, layer = row * dims.y, volume = layer * dims.z;
+    part_.voxels.num_steps = std::uint32_t(std::max<std::uint64_t>(count / volume, 1));
+    if (count >= volume) return;
+    part_.info.dims = count >= layer ? glm::uvec3(dims.x, dims.y, count / layer)
+                      : count >= row ? glm::uvec3(dims.x, count / row, 1)
+                                     : glm::uvec3(count, 1, 1);
+  }
+
+  void open_part(std::uint64_t index) {
+    part_.voxels.file = part_.voxels.files->open(index);
+    opened_ = open_file(part_, 0);
+  }
+
+  /// Goes to the first voxel of the next file. Returns whether there is one.
+  bool begin_next_file() {
+    if (next_file_ == part_.voxels.files->size()) return false;
+    open_part(next_file_++);
+    std::vector<std::byte> skipped(1u << 16);
+    while (opened_.to_skip > 0) {
+      const std::span piece =
+          std::span(skipped).first(std::min<std::uint64_t>(skipped.size(), opened_.to_skip));
+      if (opened_.source->read(piece) < piece.size()) fail("truncated");
+      opened_.to_skip -= piece.size();
+    }
+    left_ = bytes_each_;
+    return true;
+  }
+
+  void check_file_end() {
+    std::vector<std::byte> rest(size_of(part_.voxels.type));
+    if (opened_.source->read(rest) > 0) fail("too long");
+  }
+
+  [[noreturn]] void fail(std::string_view how) const {
+    throw Error("{}: {}: {} bytes of voxels are its share", part_.voxels.file->what(), how,
+                bytes_each_);
+  }
+
+  VolumeHeader part_;
+  OpenedFile opened_{};
+  std::uint64_t bytes_each_ = 0, left_ = 0, next_file_ = 0, to_skip_ = 0;
+};
 
 /// Throws  Error: float64 does not hold the integer
 template <class T>
@@ -277,37 +389,17 @@ std::optional<RawName> parse_raw_name(std::string_view stem) {
 
 std::unique_ptr<VolumeReader> open_voxels(const VolumeHeader &header) {
   const VoxelLayout &voxels = header.voxels;
-  const std::shared_ptr<const InputFile> &file = voxels.file;
-  std::uint64_t begin = find_begin(header);
-  check_size(header, file->size() - begin);
-  VolumeHeader remaining = header;
-  if (!is_compressed(voxels.encoding)) remaining.voxels.bytes_to_skip = 0;
   const std::uint64_t before = num_bytes(header.info, voxels) * voxels.step;
-  if (voxels.encoding == VoxelEncoding::kRaw) {
-    begin += before;
-  } else {
-    remaining.voxels.bytes_to_skip += before;
+  VolumeHeader remaining = header;
+  if (voxels.encoding == VoxelEncoding::kText) remaining.voxels.big_endian = false;
+  if (voxels.files) {
+    auto source = std::make_unique<FilesSource>(header, before);
+    remaining.voxels.bytes_to_skip = source->to_skip();
+    return std::make_unique<RawReader>(remaining, std::move(source));
   }
-  std::unique_ptr<ByteSource> source;
-  switch (voxels.encoding) {
-    case VoxelEncoding::kRaw:
-      source = std::make_unique<FileSource>(file, begin);
-      break;
-    case VoxelEncoding::kGzip:
-      source = std::make_unique<InflateSource>(FileSource(file, begin), Packing::kGzip);
-      break;
-    case VoxelEncoding::kGzipOrZlib:
-      source = std::make_unique<InflateSource>(FileSource(file, begin), Packing::kGzipOrZlib);
-      break;
-    case VoxelEncoding::kHex:
-      source = std::make_unique<HexSource>(file, begin);
-      break;
-    case VoxelEncoding::kText:
-      source = std::make_unique<NumberSource>(file, begin, voxels.type);
-      remaining.voxels.big_endian = false;
-      break;
-  }
-  return std::make_unique<RawReader>(remaining, std::move(source));
+  OpenedFile file = open_file(header, before);
+  remaining.voxels.bytes_to_skip = file.to_skip;
+  return std::make_unique<RawReader>(remaining, std::move(file.source));
 }
 
 std::unique_ptr<VolumeReader> open_raw(const std::shared_ptr<const InputFile> &file,

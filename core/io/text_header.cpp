@@ -107,7 +107,7 @@ void HeaderFields::fail(std::string_view name, std::string_view reason) const {
 std::vector<std::string_view> HeaderFields::words(std::string_view name, std::size_t count) const {
   std::vector<std::string_view> words = split_words((*this)[name]);
   if (words.size() != count)
-    fail(name, fmt::format("need {} value{}", count, count == 1 ? "" : "s"));
+    fail(name, fmt::format("need {} {}", count, plural(count, "value", "values")));
   return words;
 }
 

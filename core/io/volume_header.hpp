@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "core/io/input_file.hpp"
+#include "core/io/voxel_files.hpp"
 #include "core/volume/volume.hpp"
 
 namespace isowave::core {
@@ -27,6 +28,8 @@ enum class VoxelEncoding { kRaw, kGzip, kGzipOrZlib, kHex, kText };
 /// other.
 struct VoxelLayout {
   std::shared_ptr<const InputFile> file;  ///< the header's own or the one it names
+  /// Files that have the voxels, instead of `file`, each as what follows says.
+  std::shared_ptr<const VoxelFiles> files;
   VoxelEncoding encoding = VoxelEncoding::kRaw;
   std::uint64_t offset = 0;  ///< bytes of the file before the voxels, but for what is skipped:
   std::uint64_t lines_to_skip = 0;  ///< lines of the file, and then

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/base/error.hpp"
+#include "core/base/text.hpp"
 #include "core/mesh/closed_mesh.hpp"
 #include "core/mesh/largest_parts.hpp"
 
@@ -17,8 +18,8 @@
 namespace isowave::core {
 
 std::string describe(const SimplifiedMesh &mesh) {
-  return fmt::format("{} of {} triangles are left, up to about {:.3g} from the surface", mesh.after,
-                     mesh.before, mesh.error);
+  return fmt::format("{} of {} {} left, up to about {:.3g} from the surface", mesh.after,
+                     mesh.before, plural(mesh.before, "triangle is", "triangles are"), mesh.error);
 }
 
 bool can_simplify() {

@@ -147,6 +147,7 @@ void check_zfp_name(std::string_view path) {
 
 CompressedVolume open_compressed_volume(const std::string &path, const RawOverrides &overrides) {
   if (overrides.dims || overrides.type) throw Error("{}: dims and type are for raw files", path);
+  check_has_step(path, overrides.step);
   VolumeInfo info = read_zfp_file_info(path).info;
   if (overrides.spacing) info.spacing = *overrides.spacing;
   check_volume_info(info, path);
@@ -163,6 +164,7 @@ std::unique_ptr<VolumeReader> open_any_volume(const std::string &path,
   if (!path.starts_with(kGenerate)) return open_volume(path, overrides, step);
   if (overrides.dims || overrides.type)
     throw Error("{}: it says dims and type itself: leave them out", path);
+  check_has_step(path, overrides.step);
   GenerateOptions options = parse_generator(std::string_view(path).substr(kGenerate.size()));
   options.noise = noise;
   std::unique_ptr<VolumeReader> reader = open_generated(options);

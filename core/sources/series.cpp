@@ -66,6 +66,7 @@ VolumeInfo info_of(const SeriesStep &step, const RawOverrides &overrides,
   }
   if (overrides.dims || overrides.type)
     throw Error("{}: dims and type are for raw files", step.path);
+  check_has_step(step.path, overrides.step);
   VolumeInfo info = read_zfp_file_info(step.path).info;
   if (overrides.spacing) info.spacing = *overrides.spacing;
   return info;

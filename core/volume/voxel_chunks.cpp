@@ -12,6 +12,7 @@
 
 #include "core/base/error.hpp"
 #include "core/base/parallel_for.hpp"
+#include "core/base/text.hpp"
 #include "core/volume/block_errors.hpp"
 
 namespace isowave::core {
@@ -192,15 +193,17 @@ void refuse_bad_voxels(const Findings &found, const VolumeInfo &info) {
   };
   if (found.bad_count > 0) {
     throw Error(
-        "{} of {} voxels are infinite, the first at {}: replace them, or say that voxels of this "
+        "{} of {} voxels {} infinite, the first at {}: replace them, or say that voxels of this "
         "value have no data",
-        found.bad_count, info.num_voxels(), position(found.first_bad));
+        found.bad_count, info.num_voxels(), plural(found.bad_count, "is", "are"),
+        position(found.first_bad));
   }
   if (found.too_large_count > 0) {
     throw Error(
-        "{} of {} voxels are beyond +-{:.4g}, the first at {}: they cannot be drawn, scale the "
+        "{} of {} voxels {} beyond +-{:.4g}, the first at {}: they cannot be drawn, scale the "
         "volume down",
-        found.too_large_count, info.num_voxels(), kMaxMagnitude, position(found.first_too_large));
+        found.too_large_count, info.num_voxels(), plural(found.too_large_count, "is", "are"),
+        kMaxMagnitude, position(found.first_too_large));
   }
 }
 

@@ -240,7 +240,8 @@ void run_compare(const CLI::App &command, CompareArgs args) {
     throw Error("{} and {}: one is {}, the other {}", args.a.string(), args.b.string(),
                 words_for(kind), words_for(other));
   if (kind != Kind::kVolume)
-    refuse_options(command, {"--isovalue", "--size", "--view", "--up", "--zoom", "--cameras"},
+    refuse_options(command,
+                   {"--isovalue", "--size", "--view", "--up", "--zoom", "--cameras", "--index"},
                    "is for volumes, which are drawn: leave it out");
   if (!args.volumes.cameras.empty())
     refuse_options(command, {"--view", "--up"}, "--cameras says from where: leave out either");
@@ -283,6 +284,10 @@ void add_compare(CLI::App &app) {
   command->add_option("--cameras", args->volumes.cameras,
                       "Volumes: camera file, whose first camera is taken [A's box fills the "
                       "picture]");
+  command
+      ->add_option("--index", args->volumes.index,
+                   "Volumes: which of NIfTI and NRRD files with a fourth axis, from 0, such as t=3")
+      ->type_name("t=N");
   command->callback([command, args] { run_compare(*command, *args); });
 }
 

@@ -11,6 +11,7 @@
 #include "core/api/frame_parts.hpp"
 #include "core/base/error.hpp"
 #include "tools/isowave/program.hpp"
+#include "tools/isowave/volume_options.hpp"
 
 namespace isowave::core::tools {
 
@@ -91,7 +92,9 @@ void draw(const SharedVolume &volume, const ComparedVolumes &compared, const Ima
 ComparedVolumes compare_volumes(const std::filesystem::path &path_a,
                                 const std::filesystem::path &path_b,
                                 const CompareVolumesOptions &options) {
-  const SharedVolume a = isowave::open_volume(path_a), b = isowave::open_volume(path_b);
+  const isowave::RawFile chosen{.step = parse_index("--index", options.index)};
+  const SharedVolume a = isowave::open_volume(path_a, {}, chosen);
+  const SharedVolume b = isowave::open_volume(path_b, {}, chosen);
   for (const SharedVolume &volume : {a, b}) {
     for (const std::string &notice : volume->notices()) warn(notice);
   }

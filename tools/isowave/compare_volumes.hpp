@@ -36,6 +36,7 @@ struct CompareVolumesOptions {
   ImageSize size{640, 360};
   ViewOptions view;
   std::string cameras;  ///< a camera file, whose first camera is taken
+  std::string index;    ///< t=N, of both if they have a fourth axis
 };
 
 /// Draws both on the host, from one camera: of a file, or so that A's box fills the picture.

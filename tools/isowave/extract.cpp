@@ -8,6 +8,7 @@
 #include <string>
 
 #include "core/base/error.hpp"
+#include "core/base/text.hpp"
 #include "core/extract/extractor.hpp"
 #include "core/io/atomic_file.hpp"
 #include "core/io/file_name.hpp"
@@ -160,9 +161,12 @@ void run_extract(ExtractArgs options) {
       });
   compiling.finish();
   file.commit(make_progress_bar("writing"));
-  fmt::print("isovalue {}: {} vertices, {} triangles; {} blocks decoded, {:.1f} ms\n",
-             *options.isovalue, with_commas(written.size.num_vertices),
-             with_commas(written.size.num_triangles), with_commas(stats.decoded_blocks),
+  fmt::print("isovalue {}: {} {}, {} {}; {} {} decoded, {:.1f} ms\n", *options.isovalue,
+             with_commas(written.size.num_vertices),
+             plural(written.size.num_vertices, "vertex", "vertices"),
+             with_commas(written.size.num_triangles),
+             plural(written.size.num_triangles, "triangle", "triangles"),
+             with_commas(stats.decoded_blocks), plural(stats.decoded_blocks, "block", "blocks"),
              stats.total_ms);
   if (options.changes.simplify < 1) fmt::print("{}\n", describe(simplified));
   warn_of_isovalue(volume, *options.isovalue);

@@ -15,7 +15,7 @@ void group_options(CLI::App &command, const std::string &title,
 
 void group_volume_options(CLI::App &command) {
   group_options(command, "What a file does not say, or says wrongly",
-                {"--dims", "--type", "--spacing", "--no-data"});
+                {"--dims", "--type", "--spacing", "--index", "--no-data"});
 }
 
 void group_compression_options(CLI::App &command) {

@@ -73,6 +73,7 @@ CompressedVolume scan_zfp(const std::string &path) {
 Description describe_zfp(const std::string &path, const RawOverrides &overrides, bool no_scan) {
   if (overrides.dims || overrides.type)
     throw Error("{}: --dims and --type are for raw files", path);
+  check_has_step(path, overrides.step);
   CompressedVolume volume = no_scan ? read_zfp_file_info(path) : scan_zfp(path);
   if (overrides.spacing) {
     set_spacing(volume, *overrides.spacing);

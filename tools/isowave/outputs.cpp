@@ -53,7 +53,7 @@ void Outputs::read_volume(const std::string &path) {
   std::error_code failure;
   if (!fs::exists(path, failure)) return;
   read(path);
-  read(voxel_file(path));  // of a header that names it
+  visit_voxel_files(path, [&](const fs::path &file) { read(file); });
 }
 
 void Outputs::write(const std::string &option, const fs::path &path) {

@@ -17,6 +17,7 @@
 
 #include "core/api/guarded.hpp"
 #include "core/base/error.hpp"
+#include "core/base/text.hpp"
 #include "core/io/atomic_file.hpp"
 #include "core/ocl/arithmetic.hpp"
 #include "core/ocl/device.hpp"
@@ -69,7 +70,7 @@ std::string text_of(const CLI::RequiredError &error, const CLI::App &app) {
 /// The arguments that no command takes, in their order.
 std::string text_of_extras(const CLI::App &app) {
   const std::vector<std::string> extras = app.remaining(true);
-  return fmt::format("unexpected argument{} {}: see --help", extras.size() == 1 ? "" : "s",
+  return fmt::format("unexpected argument{} {}: see --help", plural(extras.size(), "", "s"),
                      fmt::join(extras, " "));
 }
 

@@ -18,6 +18,7 @@
 #include "core/base/error.hpp"
 #include "core/base/ms_since.hpp"
 #include "core/base/parallel_for.hpp"
+#include "core/base/text.hpp"
 #include "core/bricks/brick_volume.hpp"
 #include "core/bricks/ranks.hpp"
 #include "core/bricks/team_renderer.hpp"
@@ -165,6 +166,11 @@ void FrameOfMany::report_error(const Frame &frame, ordered_json &entry) const {
   });
 }
 
+/// "1 ray hits", "1,234 rays hit"
+std::string text_of_hits(std::uint64_t count) {
+  return fmt::format("{}{}", with_commas(count), plural(count, " ray hits", " rays hit"));
+}
+
 /// --refined: draws the frame once more, however long that takes.
 void FrameOfMany::write_refined(isowave::FrameRequest request) const {
   request.time_budget_ms.reset();
@@ -175,7 +181,7 @@ void FrameOfMany::write_refined(isowave::FrameRequest request) const {
     if (drawing.team.rank() == 0)
       write_png(annotated(request, refined), path(options.refined), camera_text());
   });
-  fmt::print("  refined: {} rays hit, {:.1f} ms more\n", with_commas(refined.statistics.hits),
+  fmt::print("  refined: {}, {:.1f} ms more\n", text_of_hits(refined.statistics.hits),
              refined.statistics.total_ms);
 }
 
@@ -188,12 +194,13 @@ std::string text_of_surfaces(const RenderArgs &options, double isovalue) {
   }
   const std::vector<double> isovalues =
       options.surfaces.empty() ? std::vector{isovalue} : all_isovalues(options);
-  return fmt::format("isovalue{} {}", isovalues.size() == 1 ? "" : "s", fmt::join(isovalues, ", "));
+  return fmt::format("{} {}", plural(isovalues.size(), "isovalue", "isovalues"),
+                     fmt::join(isovalues, ", "));
 }
 
 /// "1 pass, ", "2 passes, "
 std::string counted(std::size_t count, std::string_view one, std::string_view many) {
-  return fmt::format("{} {}, ", count, count == 1 ? one : many);
+  return fmt::format("{} {}, ", count, plural(count, one, many));
 }
 
 /// Draws one frame and all that is asked of it.
@@ -221,15 +228,15 @@ ordered_json draw_frame(const FrameOfMany &frame, ordered_json &own) {
                   text_of_surfaces(options, frame.isovalue), frame.view);
   if (drawing.is_team()) {
     const double ms = ms_since(begin) - last.certificate.total_ms;
-    fmt::print("{}: {} rays hit, {} bricks, {:.1f} ms\n", what, with_commas(num_hits),
-               drawing.team.size(), ms);
+    fmt::print("{}: {}, {}{:.1f} ms\n", what, text_of_hits(num_hits),
+               counted(drawing.team.size(), "brick", "bricks"), ms);
     entry = {{"isovalue", frame.isovalue},
              {"view", frame.view},
              {"rays_hit", num_hits},
              {"written_ms", ms},
              {"composition_ms", drawing.of_team->composition().ms - composed_before}};
   } else {
-    fmt::print("{}: {} rays hit, {}{}{:.1f} ms\n", what, with_commas(num_hits),
+    fmt::print("{}: {}, {}{}{:.1f} ms\n", what, text_of_hits(num_hits),
                draws_layers(options) ? counted(last.stats.layers.layers, "layer", "layers") : "",
                drawing.on_host() ? "" : counted(last.stats.passes.size(), "pass", "passes"),
                drawn.statistics.total_ms);

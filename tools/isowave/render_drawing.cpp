@@ -11,6 +11,7 @@
 #include "core/api/choices.hpp"
 #include "core/base/error.hpp"
 #include "core/base/parallel_for.hpp"
+#include "core/base/text.hpp"
 #include "core/bricks/brick_volume.hpp"
 #include "core/bricks/ranks.hpp"
 #include "core/host/host_renderer.hpp"
@@ -81,8 +82,9 @@ bool is_field_drawn(const RenderArgs &options, const Drawing &drawing) {
   if (field == "volume") return true;
   const VolumeOptions &grid = options.volume;
   std::error_code failure;
-  return !drawing.appearance.color_by_label && options.series.empty() && grid.dims.empty() &&
-         grid.type.empty() && grid.spacing.empty() &&
+  const std::string &index = options.color_map.index;
+  return !drawing.appearance.color_by_label && (index.empty() || index == grid.index) &&
+         options.series.empty() && grid.dims.empty() && grid.type.empty() && grid.spacing.empty() &&
          std::filesystem::equivalent(field, options.input, failure);
 }
 
@@ -98,6 +100,16 @@ void take_step(RenderArgs &options, Drawing &drawing, std::size_t index) {
   options.renderer_flags.values.with_levels = has_levels_to_choose(options, drawing);
 }
 
+namespace {
+
+RawOverrides field_overrides(const RenderArgs &options) {
+  RawOverrides overrides;
+  overrides.step = parse_index("--field-index", options.color_map.index);
+  return overrides;
+}
+
+}  // namespace
+
 void load_alone(RenderArgs &options, Drawing &drawing) {
   if (options.voxel_pixels > 0 || chooses_levels(options, drawing))
     want_levels(options.frame.compression);
@@ -105,9 +117,10 @@ void load_alone(RenderArgs &options, Drawing &drawing) {
   const std::string &field = options.color_map.field;
   const bool has_other = options.color_map.by_field && !is_field_drawn(options, drawing);
   if (has_other) {
-    drawing.other = load_volume(
-        field, {}, is_zfp_name(field) ? CompressionOptions{} : options.frame.compression,
-        drawing.device.get());
+    drawing.other =
+        load_volume(field, field_overrides(options),
+                    is_zfp_name(field) ? CompressionOptions{} : options.frame.compression,
+                    drawing.device.get());
   }
   drawing.series = open_series(options);
   if (drawing.series) {
@@ -128,8 +141,8 @@ void load_alone(RenderArgs &options, Drawing &drawing) {
     drawing.draws_on = ocl::DrawsOn::kDevice;
     drawing.device = open_device(options, false);
   } else if (drawing.on_host()) {
-    fmt::print("host: {} threads; choose a device with --device or ISOWAVE_DEVICE\n",
-               thread_count(0));
+    fmt::print("host: {} {}; choose a device with --device or ISOWAVE_DEVICE\n", thread_count(0),
+               plural(thread_count(0), "thread", "threads"));
   }
 }
 
@@ -155,6 +168,7 @@ void load_bricks(RenderArgs &options, Drawing &drawing) {
   TeamVolumeSource of_field;
   of_field.path = field;
   together(drawing.team, [&] {
+    of_field.overrides = field_overrides(options);
     of_field.storage =
         storage_for(field, is_zfp_name(field) ? CompressionOptions{} : options.frame.compression,
                     drawing.device.get());

@@ -220,6 +220,9 @@ void check_options(const CLI::App &command, const RenderArgs &options, const Tea
   check_surface_options(command, options, team);
   check_slice_options(command, options);
   check_movie_options(command, options);
+  if (!options.color_map.by_field)
+    refuse_options(command, {"--field-index"},
+                   "no file's values colour the surface: leave it out");
   if (team.size() > 1) {
     refuse_options(command, {"--reference", "--verbose"},
                    fmt::format("cannot be used with mpirun: {} processes draw parts of the volume",
@@ -326,10 +329,10 @@ namespace {
 void group_render_options(CLI::App &command) {
   group_options(
       command, "Options of every day",
-      {"--help",       "--isovalue",    "--surface",  "--labels", "--scene",    "--output",
-       "--size",       "--samples",     "--steps",    "--color",  "--color-by", "--color-map",
-       "--background", "--transparent", "--light",    "--shadow", "--bounce",   "--light-angle",
-       "--normals",    "--ambient",     "--annotate", "--units",  "--device"});
+      {"--help",        "--isovalue",   "--surface",     "--labels",   "--scene",    "--output",
+       "--size",        "--samples",    "--steps",       "--color",    "--color-by", "--color-map",
+       "--field-index", "--background", "--transparent", "--light",    "--shadow",   "--bounce",
+       "--light-angle", "--normals",    "--ambient",     "--annotate", "--units",    "--device"});
   group_options(command, "Views",
                 {"--view", "--up", "--zoom", "--fit", "--orbit", "--turntable", "--cameras",
                  "--save-camera", "--parallel"});

@@ -6,6 +6,7 @@
 
 #include "core/accuracy/image_error.hpp"
 #include "core/accuracy/ray_sample.hpp"
+#include "core/base/text.hpp"
 #include "core/io/npy.hpp"
 #include "core/zfp/describe_compression.hpp"
 #include "tools/isowave/program.hpp"
@@ -45,8 +46,9 @@ std::string_view errors_of(const CompressedVolume &volume) {
 
 nlohmann::ordered_json report_layers(const LayerStats &layers) {
   if (layers.rays_cut != 0)
-    warn(fmt::format("{} rays have more than {} hits; what lies behind is left out",
-                     with_commas(layers.rays_cut), ISO_MAX_LAYERS));
+    warn(fmt::format("{} {} more than {} hits; what lies behind is left out",
+                     with_commas(layers.rays_cut), plural(layers.rays_cut, "ray has", "rays have"),
+                     ISO_MAX_LAYERS));
   return {{"layers", layers.layers}, {"hits", layers.hits}, {"rays_cut", layers.rays_cut}};
 }
 
@@ -130,15 +132,15 @@ nlohmann::ordered_json report_error(double max_surface_error, const CompressedVo
                                ? 100.0
                                : 100.0 * double(summary.num_certified) / double(summary.num_pixels);
   fmt::print(
-      "  within {} pixels of the true surface{}: {:.2f} % of {} rays (bound: median {:.3g}, p99 "
+      "  within {} pixels of the true surface{}: {:.2f} % of {} {} (bound: median {:.3g}, p99 "
       "{:.3g}); {} uncertain\n"
       "  with voxels up to {:.3g} pixels apart and values up to {} off; {}, "
       "bounded in {:.0f} ms\n",
       max_surface_error,
       volume.errors_are_stated ? ", if the errors are right that the file states" : "", certified,
-      with_commas(summary.num_pixels), summary.median, summary.p99,
-      with_commas(summary.num_uncertain), choice.detail.voxel_pixels, choice.detail.voxel_error,
-      chosen_in(choice), certificate.total_ms);
+      with_commas(summary.num_pixels), plural(summary.num_pixels, "ray", "rays"), summary.median,
+      summary.p99, with_commas(summary.num_uncertain), choice.detail.voxel_pixels,
+      choice.detail.voxel_error, chosen_in(choice), certificate.total_ms);
   if (!choice.reachable) {
     warn(fmt::format("most pixels cannot be kept within {} pixels: {}", max_surface_error,
                      choice.advice));

@@ -50,7 +50,8 @@ void find_series(const CLI::App &command, RenderArgs &options, const Team &team)
     if (is_pattern(options.input))
       throw Error("{}: with mpirun, all processes draw one volume: name one file", options.input);
   } else if (std::error_code failure;
-             is_pattern(options.input) || std::filesystem::exists(options.input, failure)) {
+             is_pattern(options.input) ||
+             (options.volume.index.empty() && std::filesystem::exists(options.input, failure))) {
     options.series = find_steps(options.input);
   }
   if (options.series.empty()) {

@@ -134,6 +134,10 @@ void add_color_map_options(CLI::App &command, ColorMapOptions &options) {
       .add_option("--color-map", options.map, "colours of --color-by [viridis; by labels, labels]")
       ->check(CLI::IsMember(isowave::color_map_names()))
       ->needs("--color-by");
+  command
+      .add_option("--field-index", options.index,
+                  "--index of the file that --color-by names, or the scene's field")
+      ->type_name("t=N");
 }
 
 namespace {

@@ -38,6 +38,7 @@ void read_light(const LightOptions &options, isowave::Appearance &appearance);
 struct ColorMapOptions {
   /// X, Y, Z, NX,NY,NZ, `volume` or a file, and [,LOW,HIGH]; or `labels`, or a file and `,labels`
   std::string by;
+  std::string index{};    ///< t=N, of a field's file with a fourth axis
   std::string field{};    ///< set by read_color_map(): `volume`, a file, or none
   bool by_field = false;  ///< set by read_color_map(): colours are by it
   std::string map{};      ///< see core/view/color_maps.hpp; empty: viridis, or by labels, labels

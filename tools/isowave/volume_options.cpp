@@ -40,6 +40,20 @@ void add_volume_options(CLI::App &command, VolumeOptions &options) {
   command
       .add_option("--spacing", options.spacing, "world units between voxels: X Y Z or one for all")
       ->expected(1, 3);
+  command
+      .add_option("--index", options.index,
+                  "volume of a NIfTI or NRRD file with a fourth axis, counted from 0, such as t=3")
+      ->type_name("t=N");
+}
+
+std::optional<std::uint32_t> parse_index(const char *option, const std::string &text) {
+  if (text.empty()) return {};
+  constexpr std::string_view kAxis = "t=";
+  const auto step = text.starts_with(kAxis)
+                        ? parse_all<std::uint32_t>(std::string_view(text).substr(kAxis.size()))
+                        : std::nullopt;
+  if (!step) throw Error("{} {}: give t=N, counted from 0, such as t=3", option, text);
+  return step;
 }
 
 glm::uvec3 to_dims(const std::vector<std::uint32_t> &numbers) {
@@ -52,6 +66,7 @@ RawOverrides to_overrides(const VolumeOptions &options) {
   RawOverrides overrides;
   if (!options.dims.empty()) overrides.dims = to_dims(options.dims);
   if (!options.type.empty()) overrides.type = voxel_type_from_string(options.type);
+  overrides.step = parse_index("--index", options.index);
   const std::vector<double> &spacing = options.spacing;
   if (spacing.size() == 1) overrides.spacing = glm::dvec3(spacing[0]);
   if (spacing.size() == 2)

@@ -27,12 +27,15 @@ struct VolumeOptions {
   std::vector<std::uint32_t> dims;  ///< one number (a cube) or three
   std::string type;
   std::vector<double> spacing;  ///< one number or three
+  std::string index;            ///< t=N: of a file with a fourth axis
 };
 
-/// Adds --dims, --type and --spacing.
+/// Adds --dims, --type, --spacing and --index.
 void add_volume_options(CLI::App &command, VolumeOptions &options);
-/// Throws Error in one line on two numbers, unknown types.
+/// Throws Error in one line on two numbers, unknown types, other axes.
 RawOverrides to_overrides(const VolumeOptions &options);
+/// The entry of an option's t=N; none if the text is empty. Throws Error.
+std::optional<std::uint32_t> parse_index(const char *option, const std::string &text);
 /// N or X Y Z. Throws Error on another count.
 glm::uvec3 to_dims(const std::vector<std::uint32_t> &numbers);
 

@@ -71,12 +71,14 @@ struct Compression {
   std::function<void(std::string_view what, double done)> progress{};
 };
 
-/// Facts that the name of a raw file does not state. `NAME_XxYxZ_TYPE.raw` and `.raw.gz` state
-/// them.
+/// Facts that a file does not state, or states wrongly. `NAME_XxYxZ_TYPE.raw` and `.raw.gz` state
+/// dims and type.
 struct RawFile {
   std::optional<std::array<std::uint32_t, 3>> dims{};
   std::optional<VoxelType> type{};
   std::optional<Vector3> spacing{};  ///< replaces the spacing of a file of any format
+  std::optional<std::uint32_t>
+      step{};  ///< volume of a NIfTI or NRRD file with a fourth axis, from 0
 };
 
 /// A compressed volume in memory or in a file. It cannot be changed, so any number of renderers and

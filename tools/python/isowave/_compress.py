@@ -222,6 +222,7 @@ def open(  # noqa: A001: as gzip.open, h5py.File's habit
     ``.nii.gz``, and ``generate:FIELD_XxYxZ_TYPE``. With the packages of ``isowave[files]``: TIFF
     (OME-TIFF, ImageJ's, a folder of layers), folders of DICOM, HDF5, NetCDF, zarr and OME-Zarr,
     NPY, NPZ, MRC, VTK's ImageData (``.vti``, ``.vtk``) and NIfTI-2; most are read layer by layer.
+    A pattern of TIFF files, ``"slices_*.tif"``, is a volume with these layers, in natural order.
 
     Parameters
     ----------

@@ -3,43 +3,120 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from isowave._arrays import ArraySource
 from isowave._core import Error
 from isowave._files import (
+    Index,
+    are_layers,
     errors_with,
+    files_of_pattern,
+    is_pattern,
     is_read_by_packages,
     is_volume_folder,
     source_of_file,
+    source_of_layers,
 )
 
-COMMANDS = ("info", "convert", "render", "extract")
+COMMANDS = ("info", "convert", "render", "extract", "compare")
+FIELD = "--color-by"
+"""The option that names a second volume, in its own fields between commas."""
 _SLAB_BYTES = 64 << 20
 """About so much of a volume is in memory."""
-_NRRD_TYPES = {"float32": "float", "float64": "double", "int64": "double", "uint64": "double"}
-"""Names of voxel types in NRRD that are not numpy's. Integers of 64 bits were read exactly."""
+_NRRD_TYPES = {"float32": "float", "float64": "double"}
+"""Names of voxel types in NRRD that are not numpy's."""
 
 
-def given_files(arguments: Sequence[str]) -> list[str]:
+@dataclass(frozen=True)
+class Given:
+    """An argument of the program that is such a file, at a place of the arguments.
+
+    path   file, folder, or pattern
+    tail   what follows it in the argument: ",0,100" of --color-by
+    count  number of arguments: files of a pattern that the shell has put in its place
+    """
+
+    at: int
+    path: str
+    tail: str = ""
+    count: int = 1
+    is_field: bool = False
+
+
+def given_files(arguments: Sequence[str]) -> list[Given]:
     """The arguments of the program that are such files.
 
-    Behind an option, .npy and folders without voxels are what the program writes.
+    Behind an option, .npy and folders without voxels are what the program writes. compare takes
+    .npy of two axes itself.
     """
     if not arguments or arguments[0] not in COMMANDS:
         return []
+    found: list[Given] = []
+    for at, (before, text) in enumerate(zip(arguments, arguments[1:]), 1):
+        if before == FIELD or text.startswith(f"{FIELD}="):
+            name = text.removeprefix(f"{FIELD}=")
+            path = max((name[:end] for end in _ends(name) if _is_there(name[:end])), default="")
+            if path:
+                found.append(Given(at, path, name[len(path) :], is_field=True))
+        elif not text.startswith("-") and _is_there(text):
+            if not before.startswith("-"):
+                is_given = arguments[0] != "compare" or not _is_picture(text)
+            else:
+                is_given = is_volume_folder(text) if os.path.isdir(text) else _is_no_output(text)
+            if is_given:
+                found.append(Given(at, text))
+    return _with_layers_together(found, arguments)
 
-    def is_given(before: str, text: str) -> bool:
-        if text.startswith("-") or not os.path.exists(text) or not is_read_by_packages(text):
-            return False
-        if not before.startswith("-"):
-            return True
-        return is_volume_folder(text) if os.path.isdir(text) else not text.endswith(".npy")
 
-    return [text for before, text in zip(arguments, arguments[1:]) if is_given(before, text)]
+def _ends(name: str) -> list[int]:
+    """Where a file's name may end that is followed by fields."""
+    return [i for i, letter in enumerate(name) if letter == ","] + [len(name)]
+
+
+def _is_there(path: str) -> bool:
+    is_there = os.path.exists(path) or is_pattern(path)
+    return is_there and is_read_by_packages(path)
+
+
+def _is_no_output(path: str) -> bool:
+    return not path.endswith(".npy")
+
+
+def _is_picture(path: str) -> bool:
+    """Whether an .npy file has two axes, as depth images."""
+    if not path.endswith(".npy"):
+        return False
+    with errors_with(path):
+        return bool(np.load(path, mmap_mode="r").ndim == 2)
+
+
+def _with_layers_together(given: list[Given], arguments: Sequence[str]) -> list[Given]:
+    """Takes layers one after the other, as a shell makes them of slices_*.tif, for one volume."""
+    if arguments[0] == "compare":
+        return given
+    found: list[Given] = []
+    for each in given:
+        last = found[-1] if found else None
+        if last and not last.is_field and last.at + last.count == each.at and not each.is_field:
+            found[-1] = replace(last, count=last.count + 1)
+        else:
+            found.append(each)
+    return [each for run in found for each in _as_layers(run, arguments)]
+
+
+def _as_layers(run: Given, arguments: Sequence[str]) -> list[Given]:
+    paths = arguments[run.at : run.at + run.count]
+    if run.count == 1 or are_layers(paths):
+        return [run]
+    return [Given(run.at + i, path) for i, path in enumerate(paths)]
 
 
 def take_option(arguments: list[str], name: str) -> str | None:
@@ -55,33 +132,100 @@ def take_option(arguments: list[str], name: str) -> str | None:
     return None
 
 
-def with_nrrd(arguments: Sequence[str], files: Sequence[str], folder: str) -> list[str]:
+def with_nrrd(arguments: Sequence[str], files: Sequence[Given], folder: str) -> list[str]:
     """Returns the arguments with NRRD files, written to `folder`, in place of these.
 
-    --dataset and --index choose in each of them. The program gets --no-data as a file says it.
-    Raises Error in one line.
+    --dataset and --index choose in each of them, --field-dataset and --field-index in that of
+    --color-by. The program gets --no-data as a file says it. Raises Error in one line.
     """
-    changed = list(arguments)
-    dataset, index = take_option(changed, "--dataset"), take_option(changed, "--index")
-    says = {text.partition("=")[0] for text in changed}
-    spacing = (1.0, 1.0, 1.0) if "--spacing" in says else None  # the program replaces it
-    for number, path in enumerate(dict.fromkeys(files)):
-        source = source_of_file(path, dataset, index, spacing)
-        nrrd = os.path.join(folder, str(number), f"{Path(path).stem}.nrrd")
-        with errors_with(path):
-            os.mkdir(os.path.dirname(nrrd))
-            write_nrrd(source, nrrd)
-        changed = [nrrd if text == path else text for text in changed]
-        if number == 0 and source.no_data is not None and "--no-data" not in says:
-            changed += ["--no-data", repr(source.no_data)]
-    return changed
+    options = [*arguments]
+    names = ("--dataset", "--index", "--field-dataset", "--field-index")
+    dataset, index, of_field, field_index = (take_option(options, name) for name in names)
+    if (of_field or field_index) and not any(each.is_field for each in files):
+        name = "--field-dataset" if of_field else "--field-index"
+        raise Error(f"{name}: no file of {FIELD} has several arrays: leave it out")
+    says = {text.partition("=")[0] for text in options}
+    changed: list[str | None] = [*arguments]
+    more: list[str] = []
+    for number, each in enumerate(files):
+        paths = arguments[each.at : each.at + each.count] if each.count > 1 else [each.path]
+        if each.is_field:
+            written = _Written(paths, of_field, field_index, None)
+        else:
+            spacing = (1.0, 1.0, 1.0) if "--spacing" in says else None  # the program replaces it
+            written = _Written(paths, dataset, index, spacing)
+        takes_no_data = not each.is_field and arguments[0] != "compare"
+        try:
+            nrrd = written.write(os.path.join(folder, str(number)), takes_no_data)
+        except Error as error:
+            raise Error(_in_options(str(error), each.is_field)) from None
+        option = f"{FIELD}=" if arguments[each.at].startswith(f"{FIELD}=") else ""
+        changed[each.at : each.at + each.count] = [
+            f"{option}{nrrd}{each.tail}",
+            *(each.count - 1) * [None],
+        ]
+        if takes_no_data and written.no_data is not None and "--no-data" not in says:
+            more = ["--no-data", repr(written.no_data)]
+    left = [text for text in changed if text is not None]
+    for name in names:
+        take_option(left, name)
+    return left + more
 
 
-def write_nrrd(source: ArraySource, path: str) -> None:
-    """Writes a volume layer by layer, in its own type."""
+def _in_options(message: str, is_field: bool) -> str:
+    """A message that speaks of the program's options, not of Python's arguments."""
+    prefix = "--field-" if is_field else "--"
+    return re.sub(r"choose one by (dataset|index)", rf"choose one by {prefix}\1", message)
+
+
+class _Written:
+    """A volume, or the steps of a pattern of volumes, as NRRD."""
+
+    def __init__(
+        self,
+        paths: Sequence[str],
+        dataset: str | None,
+        index: Index | None,
+        spacing: Sequence[float] | None,
+    ) -> None:
+        """paths: one, or layers that the shell has found."""
+        self.path, self.stem = paths[0], Path(paths[0]).stem
+        self.no_data: Any = None
+        files = files_of_pattern(paths[0]) if len(paths) == 1 else paths
+        if len(files) > 1 and are_layers(files):
+            self.stem = re.sub(r"[-_.]*(\[[^]]*\]|[*?])+", "", self.stem) or "layers"
+            self.sources = [partial(source_of_layers, files, index, spacing)]
+        else:
+            self.sources = [
+                partial(source_of_file, file, dataset, index, spacing) for file in files
+            ]
+
+    def write(self, folder: str, takes_no_data: bool) -> str:
+        """Returns the name for the program. Voxels without data are NaN, or no_data is set."""
+        os.mkdir(folder)
+        for step, open_source in enumerate(self.sources):
+            source = open_source()
+            name = f"{self.stem}.nrrd" if len(self.sources) == 1 else f"step_{step}.nrrd"
+            with errors_with(self.path):
+                write_nrrd(source, os.path.join(folder, name), not takes_no_data)
+            self.no_data = source.no_data
+        if len(self.sources) == 1:
+            return os.path.join(folder, f"{self.stem}.nrrd")
+        return os.path.join(folder, "step_*.nrrd")
+
+
+def write_nrrd(source: ArraySource, path: str, with_nan: bool = False) -> None:
+    """Writes a volume layer by layer, in its own type.
+
+    with_nan  voxels without data become NaN, and integers numbers that can be
+    """
     nz, ny, nx = source.shape
-    kind = source.dtype.name
-    stored = np.dtype("float64") if kind in ("int64", "uint64") else source.dtype
+    stored, no_data = source.dtype, source.no_data if with_nan else None
+    if stored.name in ("int64", "uint64"):  # read exactly
+        stored = np.dtype("float64")
+    if no_data is not None and stored.kind in "iu":
+        stored = np.dtype("float32" if stored.itemsize <= 2 else "float64")
+    kind = stored.name
     steps = (source.direction * source.spacing[::-1]).T.tolist()
     vectors = [f"({','.join(map(repr, step))})" for step in [*steps, source.origin[::-1]]]
     space = "space: left-posterior-superior" if source.is_anatomical else "space dimension: 3"
@@ -96,4 +240,6 @@ def write_nrrd(source: ArraySource, path: str) -> None:
         file.write(header.encode())
         for begin in range(0, nz, layers):
             voxels = source.read(begin, min(begin + layers, nz))
+            if no_data is not None:
+                voxels = np.where(voxels == no_data, np.nan, voxels.astype(stored))
             file.write(voxels.astype(stored.newbyteorder("<"), copy=False).data)

@@ -118,13 +118,15 @@ def _is_volume(fields: dict[str, Any], options: dict[str, Any]) -> bool:
         return False
 
 
-def open_field(name: str, options: dict[str, Any]) -> Volume:
-    """Opens a second volume beside one that is opened with these options."""
+def open_field(name: str, options: dict[str, Any], **own: Any) -> Volume:
+    """Opens a second volume beside one that is opened with these options.
+
+    own  dataset and index of this one; None: no
+    """
     if name.endswith(".zfp"):  # compressed already
-        return open_volume(name)
-    return open_volume(
-        name, **{key: each for key, each in options.items() if key not in _OF_ONE_FILE}
-    )
+        return open_volume(name, **own)
+    shared = {key: each for key, each in options.items() if key not in _OF_ONE_FILE}
+    return open_volume(name, **shared, **own)
 
 
 def optional_vector(value: Any) -> Any:

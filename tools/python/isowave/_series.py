@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import glob
 import os
 import threading
 import warnings
@@ -19,10 +18,12 @@ from isowave._checked import Isovalue, refuse, reversed_axes
 from isowave._compress import compress, compression_options, dims_of, open_source, step_of
 from isowave._files import (
     Index,
+    are_layers,
+    files_of_pattern,
     is_read_by_packages,
-    natural_order,
     parse_index,
     source_of_file,
+    source_of_layers,
     steps_of_file,
 )
 from isowave._handed_on import takes
@@ -122,7 +123,8 @@ def open_series(
     ----------
     source
         A pattern of files, as in a shell (*, ?, [a-z]), taken in natural order: step_2 before
-        step_10. Or a file with an axis t beside z, y and x, a list of paths, or an array with the
+        step_10. TIFF files of one picture each are the layers of one step. Or a file with an axis
+        t beside z, y and x, a list of paths, or an array with the
         axes (t, z, y, x), whose parts array[t] compress() takes.
     tolerance, relative_tolerance, rate, exact, levels, map_nan, no_data, num_threads
         As compress() has them, for each step.
@@ -225,17 +227,23 @@ class FileSteps:
 
 @dataclass
 class ReadSteps:
-    """Opens files that packages of Python read. steps: file, entries of its further axes."""
+    """Opens files that packages of Python read.
 
-    steps: Sequence[tuple[str, Index | None]]
+    steps  files, and entries of their further axes; several files are the layers of a step
+    """
+
+    steps: Sequence[tuple[Sequence[str], Index | None]]
     dataset: str | None
     spacing: Sequence[float] | None
     options: dict[str, Any]
 
     def __call__(self, step: int) -> Volume:
-        file, entries = self.steps[step]
-        source = source_of_file(file, self.dataset, entries, self.spacing)
-        return open_source(file, source, self.options, progress=False)
+        files, entries = self.steps[step]
+        if len(files) > 1:
+            source = source_of_layers(files, entries, self.spacing)
+        else:
+            source = source_of_file(files[0], self.dataset, entries, self.spacing)
+        return open_source(files[0], source, self.options, progress=False)
 
 
 def of_read_files(
@@ -245,8 +253,17 @@ def of_read_files(
     spacing: Sequence[float] | None,
     options: dict[str, Any],
 ) -> Series:
-    """Steps that packages of Python read: files, or the entries of one file's axis t."""
-    files = [file for path in paths for file in matching(path)]
+    """Steps that packages of Python read: files, or the entries of one file's axis t.
+
+    Several TIFF files of one picture each are the layers of the only step.
+    """
+    files = [file for path in paths for file in files_of_pattern(path)]
+    if len(files) > 1 and are_layers(files):
+        if dataset is not None:
+            raise _core.Error(f"{paths[0]}: dataset {dataset}: layers are one array")
+        name = paths[0] if len(paths) == 1 else f"{files[0]} to {os.path.basename(files[-1])}"
+        layers = [as_absolute(file) for file in files]
+        return Series([name], ReadSteps([(layers, index)], None, spacing, options))
     steps = [(file, file, index) for file in files]
     along = steps_of_file(files[0], dataset, index)
     if along is not None and len(files) == 1:
@@ -264,16 +281,6 @@ def of_read_files(
             raise _core.Error(f"{file}: it has another grid than {files[0]}")
 
     load = ReadSteps(
-        [(as_absolute(file), entries) for _, file, entries in steps], dataset, spacing, options
+        [([as_absolute(file)], entries) for _, file, entries in steps], dataset, spacing, options
     )
     return Series([name for name, _, _ in steps], load)
-
-
-def matching(path: str) -> list[str]:
-    """The files of a pattern, in natural order; other paths as they are. Raises Error if none."""
-    if os.path.exists(path) or not glob.has_magic(path):
-        return [path]
-    found = sorted(glob.glob(path), key=natural_order)
-    if not found:
-        raise _core.Error(f"{path}: no file has such a name")
-    return found

@@ -17,7 +17,7 @@ from test_series import nrrd
 import isowave
 from isowave import _program
 from isowave._arrays import as_source
-from isowave._given_files import given_files, take_option, write_nrrd
+from isowave._given_files import Given, given_files, take_option, write_nrrd
 from isowave.viewer.command import make_parser, series_of
 
 
@@ -155,6 +155,125 @@ def test_the_program_says_in_one_line_what_is_wrong(folder, arguments, text):
     assert text in done.stderr
 
 
+def stack(folder):
+    """Layers in files slices_7.tif to slices_13.tif; returns their paths."""
+    write.tiff_folder(folder / "layers")
+    for file in (folder / "layers").iterdir():
+        file.rename(folder / file.name.replace("layer", "slices"))
+    return [folder / f"slices_{i}.tif" for i in range(7, 14)]
+
+
+def test_a_pattern_of_layers_is_a_volume(folder, monkeypatch):
+    """slices_10.tif comes after slices_9.tif, and the shell may have found the files."""
+    files = stack(folder)
+    monkeypatch.chdir(folder)
+    volume = isowave.open("slices_*.tif", spacing=SPACING)
+    assert np.array_equal(volume[...], VOXELS) and volume.spacing == SPACING
+    for given in (["slices_*.tif"], files):
+        x, y, z = SPACING[::-1]
+        done = command("convert", *given, "--exact", "--spacing", x, y, z, "-o", "out.zfp")
+        assert done.returncode == 0, done.stderr
+        out = isowave.open("out.zfp")
+        assert np.array_equal(out[...], VOXELS) and out.spacing == SPACING
+        series = isowave.open_series(given if len(given) > 1 else given[0], spacing=SPACING)
+        assert len(series) == 1 and np.array_equal(series[0][...], VOXELS)
+        assert series_of([str(each) for each in given], {})[0].shape == VOXELS.shape
+    done = command("render", "slices_*.tif", "--device", "host", "--size", "32x24")
+    assert done.returncode == 0, done.stderr
+    assert [each.name for each in folder.glob("slices*.png")] == [
+        f"slices_iso{volume.suggested_isovalues()[0]:g}.png"
+    ]
+    done = command("info", "nothing_*.tif")
+    assert (done.returncode, done.stderr) == (
+        1, "isowave: nothing_*.tif: no file has such a name\n"
+    )  # fmt: skip
+    with pytest.raises(isowave.Error, match=r"no_\*.tif: no file has such a name"):
+        isowave.open("no_*.tif")
+    with pytest.raises(isowave.Error, match="dataset 1: layers are one array"):
+        isowave.open_series("slices_*.tif", dataset="1")
+
+
+def test_a_pattern_of_volumes_is_a_series(folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    for t in (2, 10):
+        write.ome_tiff(folder / f"s_{t}.ome.tif", VOXELS + t)
+        nrrd(folder / f"{t}.nrrd", (VOXELS + t + 100).astype("uint8"))
+    with pytest.raises(isowave.Error, match=r"each of several files is one layer.*open_series\(\)"):
+        isowave.open("s_*.tif")
+    look = ("-i", 20, "--device", "host", "--size", "32x24")
+    done = command("render", "s_*.tif", *look, "-o", "a.png")
+    assert done.returncode == 0, done.stderr
+    for i, t in enumerate((2, 10)):
+        assert command("render", f"s_{t}.ome.tif", *look, "-o", "b.png").returncode == 0
+        assert pathlib.Path(f"a_step{i}.png").read_bytes() == pathlib.Path("b.png").read_bytes()
+
+
+def two_datasets(path):
+    h5py = pytest.importorskip("h5py")
+
+    with h5py.File(path, "w") as file:
+        for name, voxels in (("s/ct", VOXELS), ("s/heat", VOXELS[::-1])):
+            file[name] = voxels
+            file[name].attrs["element_size_um"] = SPACING
+
+
+@pytest.mark.parametrize("name", ["a.h5", "a.nc", "a.zarr"])
+def test_a_field_is_chosen_by_its_name(folder, monkeypatch, name):
+    """In a file of several arrays, of which one is the volume."""
+    monkeypatch.chdir(folder)
+    ct, heat = "ct", "heat"
+    if name == "a.h5":
+        two_datasets(folder / name)
+        ct, heat = "s/ct", "s/heat"
+    else:
+        xarray = pytest.importorskip("xarray")
+        axes = {axis: write.even("zyx".index(axis), n) for axis, n in zip("zyx", VOXELS.shape)}
+        arrays = {"ct": ("zyx", VOXELS), "heat": ("zyx", VOXELS[::-1])}
+        data = xarray.Dataset({n: (list(a), v) for n, (a, v) in arrays.items()}, axes)
+        data.to_zarr(name) if name == "a.zarr" else data.to_netcdf(name)
+    look = ("-i", 20, "--device", "host", "--size", "32x24")
+    done = command(
+        "render", name, "--dataset", ct, "--color-by", f"{name},0,40", "--field-dataset", heat,
+        *look, "-o", "a.png",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    volume, field = isowave.open(name, dataset=ct), isowave.open(name, dataset=heat)
+    by_field = isowave.ColorMap(by="field", range=(0, 40))
+    image = volume.render(20, field=field, color_map=by_field, size=(32, 24), device="host")
+    image.save("b.png")
+    assert pathlib.Path("a.png").read_bytes() == pathlib.Path("b.png").read_bytes()
+    done = command("render", name, "--dataset", ct, "--color-by", name, *look, "-o", "a.png")
+    assert done.returncode == 1 and done.stderr.count("\n") == 1
+    assert "choose one by --field-dataset" in done.stderr
+    done = command("render", name, "--dataset", ct, "--field-dataset", heat, *look)
+    assert done.stderr == (
+        "isowave: --field-dataset: no file of --color-by has several arrays: leave it out\n"
+    )
+
+
+def test_the_program_compares_files_of_packages(folder, monkeypatch):
+    h5py = pytest.importorskip("h5py")
+
+    monkeypatch.chdir(folder)
+    with h5py.File("a.h5", "w") as file:
+        file["ct"] = VOXELS
+        file["ct"].attrs["_FillValue"] = VOXELS[1, 2, 1]
+    write.npy("b.npy")
+    found = {}
+    for other in ("a.h5", "b.npy"):
+        done = command("compare", "a.h5", other, "-i", 20, "--size", "32x24", "--json")
+        assert done.returncode == 0, done.stderr
+        found[other] = json.loads(done.stdout)["voxels"]
+    missing = int((VOXELS == VOXELS[1, 2, 1]).sum())
+    assert found["a.h5"]["differing"] == 0 and found["a.h5"]["voxels"] == VOXELS.size
+    assert found["b.npy"]["without_data_in_one"] == found["b.npy"]["differing"] == missing > 0
+    write.ome_zarr(folder / "a.zarr", STEPS, ("c",))
+    which = ("--dataset", "0", "--index", "c=2")
+    done = command("compare", "a.zarr", "a.zarr", *which, "-i", 20, "--size", "32x24")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith(f"equal: all bits of {VOXELS.size} voxels\n")
+
+
 def test_signals_leave_no_file_behind(folder, monkeypatch):
     """The program, here one that waits, ends with its parent's SIGTERM."""
     write.npy(folder / "a.npy")
@@ -178,14 +297,29 @@ def test_which_arguments_are_files(tmp_path, monkeypatch):
     write.tiff_folder(tmp_path / "layers")
     for name in ("pictures", "a.nrrd", "b.tif"):
         pathlib.Path(name).mkdir() if name == "pictures" else pathlib.Path(name).write_text("")
-    assert given_files(["render", "a.npy", "--depth", "a.npy"]) == ["a.npy"]
+    assert given_files(["render", "a.npy", "--depth", "a.npy"]) == [Given(1, "a.npy")]
     assert given_files(["render", "a.nrrd", "--depth", "a.npy", "--progress-dir", "pictures"]) == []
     assert given_files(["render", "--exact", "layers", "--color-by", "b.tif"]) == [
-        "layers",
-        "b.tif",
+        Given(2, "layers"),
+        Given(4, "b.tif", is_field=True),
     ]
-    assert given_files(["compare", "a.npy", "a.npy"]) == given_files(["--help"]) == []
+    field = {"path": "b.tif", "is_field": True}
+    assert given_files(["render", "a.nrrd", "--color-by", "b.tif,0,100"]) == [
+        Given(3, tail=",0,100", **field)
+    ]
+    assert given_files(["render", "--color-by=b.tif,labels"]) == [Given(1, tail=",labels", **field)]
+    assert given_files(["render", "a.nrrd", "--color-by", "x,0,1"]) == []
+    np.save("depth.npy", VOXELS[0])
+    assert given_files(["compare", "depth.npy", "depth.npy"]) == given_files(["--help"]) == []
+    assert given_files(["compare", "a.npy", "depth.npy"]) == [Given(1, "a.npy")]
     assert given_files(["render", "a.nrrd", "-i", "80", "missing.tif"]) == []
+    assert given_files(["render", "missing_*.tif"]) == [Given(1, "missing_*.tif")]
+    files = [f"layers/layer_{i}.tif" for i in range(7, 14)]
+    assert given_files(["render", "-i", "80", *files]) == [Given(3, files[0], count=7)]
+    assert given_files(["compare", *files[:2]]) == [Given(1, files[0]), Given(2, files[1])]
+    write.tiff("c.tif")
+    write.tiff("d.tif")
+    assert given_files(["info", "c.tif", "d.tif"]) == [Given(1, "c.tif"), Given(2, "d.tif")]
     arguments = ["a", "--index", "t=1", "--x=y", "--dataset=q", "b"]
     assert (take_option(arguments, "--index"), take_option(arguments, "--dataset")) == ("t=1", "q")
     assert take_option(arguments, "--index") is None and arguments == ["a", "--x=y", "b"]

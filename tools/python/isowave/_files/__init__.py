@@ -15,16 +15,30 @@ all other formats go to the compiled part (core/io).
 """
 
 from .contents import Index, parse_index
-from .kinds import errors_with, is_read_by_packages, is_volume_folder, source_of_file, steps_of_file
+from .kinds import (
+    are_layers,
+    errors_with,
+    files_of_pattern,
+    is_pattern,
+    is_read_by_packages,
+    is_volume_folder,
+    source_of_file,
+    source_of_layers,
+    steps_of_file,
+)
 from .order import natural_order
 
 __all__ = [
     "Index",
+    "are_layers",
     "errors_with",
+    "files_of_pattern",
+    "is_pattern",
     "is_read_by_packages",
     "is_volume_folder",
     "natural_order",
     "parse_index",
     "source_of_file",
+    "source_of_layers",
     "steps_of_file",
 ]

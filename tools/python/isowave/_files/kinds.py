@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import glob
 import os
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
@@ -13,6 +14,7 @@ from isowave._core import Error
 
 from . import dicom, hdf5, mrc, netcdf, nifti2, numpy_file, tiff, vtk_file, zarr_store
 from .contents import Contents, Index, parse_index, pick, time_axis
+from .order import natural_order
 
 Reader = Callable[[str, "str | None", bool], Contents]
 """(path, dataset, whether the caller gave a spacing) -> contents. Raises any exception."""
@@ -55,6 +57,29 @@ _READERS: dict[str, Reader] = {
 def is_read_by_packages(path: str) -> bool:
     """Whether a path, or a pattern of paths, is for the readers here, not for the compiled part."""
     return not path.startswith("generate:") and _reader_of(path) is not None
+
+
+def is_pattern(path: str) -> bool:
+    """Whether a path stands for several files: it has *, ? or [, and there is no such file."""
+    return glob.has_magic(path) and not os.path.exists(path)
+
+
+def files_of_pattern(path: str) -> list[str]:
+    """The files of a pattern, in natural order; of another path, itself. Raises Error if none."""
+    if not is_pattern(path):
+        return [path]
+    found = sorted(glob.glob(path), key=natural_order)
+    if not found:
+        raise Error(one_line(f"{path}: no file has such a name"))
+    return found
+
+
+def are_layers(paths: Sequence[str]) -> bool:
+    """Whether these are TIFF files with a layer of one volume each. Raises Error."""
+    if not all(path.lower().endswith((".tif", ".tiff")) for path in paths):
+        return False
+    with errors_with(paths[0]):
+        return tiff.is_layer(paths[0])
 
 
 def is_volume_folder(path: str) -> bool:
@@ -106,6 +131,10 @@ def contents_of(path: str, dataset: str | None, has_spacing: bool) -> Contents:
     """Raises what a package raises: call it in errors_with()."""
     reader = _reader_of(path)
     assert reader is not None
+    if is_pattern(path):
+        if reader is not tiff.read:
+            raise ValueError("a pattern of files is a series: open_series() opens it")
+        return tiff.read_layers(files_of_pattern(path), dataset)
     if not os.path.exists(path):
         raise FileNotFoundError(2, os.strerror(2))
     return reader(path, dataset, has_spacing)
@@ -116,7 +145,7 @@ def source_of_file(
 ) -> ArraySource:
     """Returns the source of a file's volume, which reads the file layer by layer if it can.
 
-    path     one for which is_read_by_packages()
+    path     one for which is_read_by_packages(); a pattern of TIFF files: its layers
     dataset  name of an array of the file; None: there is only one
     index    entries of further axes
     spacing  (z, y, x), replaces the file's
@@ -126,6 +155,14 @@ def source_of_file(
     with errors_with(path):
         contents = contents_of(path, dataset, spacing is not None)
         return source_of(pick(contents, parse_index(index)), spacing=spacing)
+
+
+def source_of_layers(
+    files: Sequence[str], index: Index | None, spacing: Sequence[float] | None
+) -> ArraySource:
+    """As source_of_file(), of TIFF files that are the layers of one volume, in their order."""
+    with errors_with(files[0]):
+        return source_of(pick(tiff.read_layers(files, None), parse_index(index)), spacing=spacing)
 
 
 def steps_of_file(path: str, dataset: str | None, index: Index | None) -> tuple[str, int] | None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import importlib
 import os
 import re
+from collections.abc import Sequence
 from typing import Any
 from xml.etree import ElementTree
 
@@ -84,18 +85,30 @@ def layers_in(folder: str) -> list[str]:
     return [os.path.join(folder, name) for name in names if re.search(r"(?i)\.tiff?$", name)]
 
 
+def is_layer(path: str) -> bool:
+    """Whether a file has one picture, so that several are the layers of a volume."""
+    tifffile = importlib.import_module("tifffile")
+    with tifffile.TiffFile(path) as tiff:
+        return len(tiff.series) == 1 and tiff.series[0].axes[:2] == "YX"
+
+
 def read_folder(path: str, dataset: str | None, has_spacing: bool) -> Contents:
     """See kinds.Reader. Each file is a layer."""
+    return read_layers(layers_in(path), dataset)
+
+
+def read_layers(files: Sequence[str], dataset: str | None) -> Contents:
+    """Each file is a layer, in this order."""
     tifffile = importlib.import_module("tifffile")
     if dataset is not None:
-        raise bad_value(f"dataset {dataset}", "a folder of TIFF files is one array")
-    files = layers_in(path)
+        raise bad_value(f"dataset {dataset}", "layers in TIFF files are one array")
     with tifffile.TiffFile(files[0]) as tiff:
         first = tiff.series[0]
         if len(tiff.series) > 1 or first.axes[:2] != "YX":
             raise bad_value(
                 os.path.basename(files[0]),
-                f"axes {first.axes.lower()}: a file of a folder is one layer; open the file itself",
+                f"axes {first.axes.lower()}: each of several files is one layer; open the file "
+                "itself, or all by open_series()",
             )
         sizes, dtype = first.shape, first.dtype
         placement = Placement(_spacing(tiff, 0))
