@@ -17,8 +17,8 @@ namespace isowave::core {
 
 /// Replaces what a raw file's name says, and chooses. Unset fields come from the file.
 struct RawOverrides {
-  std::optional<glm::uvec3> dims;
-  std::optional<VoxelType> type;
+  std::optional<glm::uvec3> dims{};
+  std::optional<VoxelType> type{};
   std::optional<glm::dvec3> spacing{};  ///< also replaces the spacing of other formats
   std::optional<std::uint32_t>
       step{};  ///< which volume of a file of other formats with a fourth axis

@@ -9,6 +9,7 @@
 
 #include "core/io/npy.hpp"
 #include "core/io/png.hpp"
+#include "core/view/frame.hpp"
 #include "isowave/host.hpp"
 #include "tools/isowave/view_options.hpp"
 
