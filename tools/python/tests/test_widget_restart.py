@@ -131,6 +131,6 @@ def test_a_kernel_that_was_busy_takes_the_note_away(comm: Comm) -> None:
     page = comm.page
     note = page.locator(".note")
     page.wait_for_function("() => sent.length > 0")
-    note.wait_for()  # nobody carries messages meanwhile
+    note.wait_for()  # no message is carried meanwhile
     assert "If it is busy, pictures follow." in note.text_content()
     comm.carry_until(lambda: page.locator("[data-stage=lossless]").count() and note.is_hidden())
