@@ -15,7 +15,7 @@ from typing import Any
 
 from isowave import _loader
 from isowave._core import Error
-from isowave._given_files import given_files, with_nrrd
+from isowave._given_files import Given, given_files, with_nrrd
 from isowave.viewer import command
 
 PROGRAM = _loader.PACKAGE / "bin" / "isowave"
@@ -51,7 +51,7 @@ def main() -> int:
     os.execv(PROGRAM, ["isowave", *arguments])
 
 
-def run_with_nrrd(arguments: Sequence[str], files: Sequence[str]) -> int:
+def run_with_nrrd(arguments: Sequence[str], files: Sequence[Given]) -> int:
     """Runs the program with NRRD files in place of these. Returns its exit status."""
 
     def stop(*_: Any) -> None:
