@@ -529,7 +529,10 @@ void run_render(const CLI::App &command, RenderArgs options) {
     if (drawing.team.rank() == 0) save_cameras(options, drawing);
     if (!drawing.movie) return;
     drawing.movie->commit();
-    fmt::print("wrote {}: {} pictures\n", options.movie, drawing.movie->num_frames());
+    fmt::print("wrote {}: {} {}, {:.3g} s at --fps {}\n", options.movie,
+               drawing.movie->num_frames(),
+               plural(drawing.movie->num_frames(), "picture", "pictures"),
+               double(drawing.movie->num_frames()) / options.fps, options.fps);
   });
   if (options.names_picture) print_picture_name(options, drawing.views.count);
 }

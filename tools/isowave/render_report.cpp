@@ -76,6 +76,13 @@ std::string chosen_in(const DetailChoice &choice) {
                               : fmt::format("chosen in {:.0f} ms", choice.total_ms);
 }
 
+/// "with voxels up to 2 pixels apart and values up to 0.5 off", "at full detail"
+std::string text_of_detail(const Detail &detail) {
+  if (detail == Detail{}) return "at full detail";
+  return fmt::format("with voxels up to {:.3g} pixels apart and values up to {} off",
+                     detail.voxel_pixels, detail.voxel_error);
+}
+
 nlohmann::ordered_json report_sample(double max_surface_error, const DetailChoice &choice) {
   const SampledShare &sample = choice.sample.value();
   if (choice.detail == Detail{}) {
@@ -87,10 +94,10 @@ nlohmann::ordered_json report_sample(double max_surface_error, const DetailChoic
     fmt::print(
         "  within {} pixels of the surface at full detail: {:.2f} % of {} hits of {} sampled rays\n"
         "  at least {:.2f} % of all hits, with {:.0f} % confidence (Clopper-Pearson)\n"
-        "  with voxels up to {:.3g} pixels apart and values up to {} off; {}\n",
+        "  {}; {}\n",
         max_surface_error, 100 * sample.share(), with_commas(sample.num_hits),
         with_commas(sample.num_rays), 100 * sample.lowest, 100 * kConfidence,
-        choice.detail.voxel_pixels, choice.detail.voxel_error, chosen_in(choice));
+        text_of_detail(choice.detail), chosen_in(choice));
   }
   return {{"max_surface_error", max_surface_error}, {"by", "sample"},
           {"chosen", detail_json(choice.detail)},   {"tries", tries_json(choice, "within")},
@@ -134,13 +141,12 @@ nlohmann::ordered_json report_error(double max_surface_error, const CompressedVo
   fmt::print(
       "  within {} pixels of the true surface{}: {:.2f} % of {} {} (bound: median {:.3g}, p99 "
       "{:.3g}); {} uncertain\n"
-      "  with voxels up to {:.3g} pixels apart and values up to {} off; {}, "
-      "bounded in {:.0f} ms\n",
+      "  {}; {}, bounded in {:.0f} ms\n",
       max_surface_error,
       volume.errors_are_stated ? ", if the errors are right that the file states" : "", certified,
       with_commas(summary.num_pixels), plural(summary.num_pixels, "ray", "rays"), summary.median,
-      summary.p99, with_commas(summary.num_uncertain), choice.detail.voxel_pixels,
-      choice.detail.voxel_error, chosen_in(choice), certificate.total_ms);
+      summary.p99, with_commas(summary.num_uncertain), text_of_detail(choice.detail),
+      chosen_in(choice), certificate.total_ms);
   if (!choice.reachable) {
     warn(fmt::format("most pixels cannot be kept within {} pixels: {}", max_surface_error,
                      choice.advice));
