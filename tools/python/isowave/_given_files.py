@@ -178,6 +178,15 @@ def _in_options(message: str, is_field: bool) -> str:
     return re.sub(r"choose one by (dataset|index)", rf"choose one by {prefix}\1", message)
 
 
+def _stem_of(names: Sequence[str]) -> str:
+    """What names of layers have in common, or a pattern without its wildcards."""
+    if len(names) == 1:
+        stem = re.sub(r"[-_.]*(\[[^]]*\]|[*?])+", "", names[0])
+    else:
+        stem = re.sub(r"[-_.0-9]*$", "", os.path.commonprefix([*names]))
+    return stem or "layers"
+
+
 class _Written:
     """A volume, or the steps of a pattern of volumes, as NRRD."""
 
@@ -193,7 +202,7 @@ class _Written:
         self.no_data: Any = None
         files = files_of_pattern(paths[0]) if len(paths) == 1 else paths
         if len(files) > 1 and are_layers(files):
-            self.stem = re.sub(r"[-_.]*(\[[^]]*\]|[*?])+", "", self.stem) or "layers"
+            self.stem = _stem_of([Path(path).stem for path in paths])
             self.sources = [partial(source_of_layers, files, index, spacing)]
         else:
             self.sources = [
