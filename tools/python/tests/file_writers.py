@@ -139,6 +139,10 @@ def packed_mrc(path):
     mrc(path, compression="gzip")
 
 
+def bzip2_mrc(path):
+    mrc(path, compression="bzip2")
+
+
 def turned_mrc(path):
     """Columns along z, rows along x, sections along y; without an origin, but with a start."""
     mrcfile = pytest.importorskip("mrcfile")
@@ -187,14 +191,31 @@ def vti_of_cells(path):
     vti(path, cells=True, mode="Binary")
 
 
-def legacy_vtk(path):
+def vti_in_parts(path):
+    """Two files, cut along z, and one that names them."""
+    vtk = pytest.importorskip("vtk")
+
+    writer = vtk.vtkXMLPImageDataWriter()
+    writer.SetInputData(vtk_image())
+    writer.SetFileName(str(path))
+    writer.SetNumberOfPieces(2)
+    writer.SetStartPiece(0)
+    writer.SetEndPiece(1)
+    assert writer.Write() == 1
+
+
+def legacy_vtk(path, mode="Binary"):
     vtk = pytest.importorskip("vtk")
 
     writer = vtk.vtkStructuredPointsWriter()
     writer.SetInputData(vtk_image())
     writer.SetFileName(str(path))
-    writer.SetFileTypeToBinary()
+    getattr(writer, f"SetFileTypeTo{mode}")()
     assert writer.Write() == 1
+
+
+def ascii_vtk(path):
+    legacy_vtk(path, "ASCII")
 
 
 def nifti2(path, voxels=VOXELS, kind="Nifti2Image"):
@@ -223,10 +244,14 @@ FORMATS = [
     ("a.npz", npz, "ct", UNIT, ZERO),
     ("a.mrc", mrc, None, SPACING, ORIGIN),
     ("a.mrc.gz", packed_mrc, None, SPACING, ORIGIN),
+    ("a.mrc.bz2", bzip2_mrc, None, SPACING, ORIGIN),
+    ("a.rec", mrc, None, SPACING, ORIGIN),
     ("turned.map", turned_mrc, None, SPACING, (15.0, 20.0, -20.0)),
     ("a.vti", vti, None, SPACING, ORIGIN),
     ("cells.vti", vti_of_cells, "ct", SPACING, ORIGIN),
+    ("parts.pvti", vti_in_parts, None, SPACING, ORIGIN),
     ("a.vtk", legacy_vtk, None, SPACING, ORIGIN),
+    ("ascii.vtk", ascii_vtk, None, SPACING, ORIGIN),
     ("a.nii", nifti2, None, SPACING, ORIGIN),
     ("b.nii.gz", nifti2, None, SPACING, ORIGIN),
 ]
