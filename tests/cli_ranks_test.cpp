@@ -363,7 +363,7 @@ TEST_F(CliRanks, RefusedVoxelsAreCountedOnce) {
   const std::string arguments = "convert " + bad + " -o " + quoted(folder_ / "v.zfp") + " ";
   for (const char *options : {"--rate 8 --levels all", "--tolerance 0.1"}) {
     expect_error(on_ranks(3, arguments + options),
-                 "isowave: 4 of 5265 voxels are infinite, the first at (5,2,10)");
+                 "isowave: 4 of 5265 voxels are infinite, the first at x=5, y=2, z=10");
   }
   expect_error(on_ranks(3, arguments + "--map-nan 0 --levels 7"), "7 levels of detail");
   EXPECT_EQ(folder_.num_files(), 1u);

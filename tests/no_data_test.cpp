@@ -128,8 +128,9 @@ TEST(NoData, OtherInfiniteVoxelsAreRefused) {
   std::vector<float> voxels(64, 1.0f);
   voxels[6] = -INFINITY;
   voxels[7] = kNone;
-  EXPECT_THAT([&] { compressed(dims, voxels); },
-              ThrowsMessage<Error>(HasSubstr("1 of 64 voxels are infinite, the first at (2,1,0)")));
+  EXPECT_THAT(
+      [&] { compressed(dims, voxels); },
+      ThrowsMessage<Error>(HasSubstr("1 of 64 voxels is infinite, the first at x=2, y=1, z=0")));
   EXPECT_EQ(
       compressed(dims, voxels, {.rate = 16, .input = {.no_data = -INFINITY}}).no_data.num_voxels(),
       2u);

@@ -189,7 +189,7 @@ void check_line(const Line &line, const InputOptions &options, Findings &found) 
 void refuse_bad_voxels(const Findings &found, const VolumeInfo &info) {
   const auto position = [&](std::uint64_t voxel) {
     const std::uint64_t x = info.dims.x, y = info.dims.y;
-    return fmt::format("({},{},{})", voxel % x, voxel / x % y, voxel / (x * y));
+    return fmt::format("x={}, y={}, z={}", voxel % x, voxel / x % y, voxel / (x * y));
   };
   if (found.bad_count > 0) {
     throw Error(

@@ -102,7 +102,7 @@ def test_lazy_masks(dtype):
 
 
 def test_what_cannot_be():
-    with pytest.raises(isowave.Error, match="are infinite, the first at"):
+    with pytest.raises(isowave.Error, match="(is|are) infinite, the first at x="):
         isowave.compress(holed(np.inf))
     with pytest.raises(isowave.Error, match="give one of the two"):
         isowave.compress(holed(np.inf), no_data=np.inf, map_nan=0)
