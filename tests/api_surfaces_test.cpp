@@ -162,7 +162,7 @@ TEST_P(ApiSurfacesOnDevice, IsMadeForSoMany) {
   EXPECT_FALSE(none.can_draw(request));
   EXPECT_THAT(error_of([&] { none.render(request); }), HasSubstr("made with_surfaces"));
   EXPECT_THAT(error_of([&] { one.render(request); }),
-              HasSubstr("made for 1 surfaces, and 2 are given"));
+              HasSubstr("made for 1 surface, and 2 are given"));
   EXPECT_THAT(error_of([&] { Renderer(device_, volume, {.with_surfaces = 9}); }),
               HasSubstr("a frame has at most 8 surfaces: 9 are too many"));
 }

@@ -256,7 +256,7 @@ TEST_P(LayersOnDevice, RefusesWhatItWasNotMadeFor) {
   EXPECT_THAT([&] { none.render(request); }, ThrowsMessage<Error>(HasSubstr("with_surfaces")));
   DeviceRenderer one(device_, volume, {.size = kSize, .max_surfaces = 1});
   EXPECT_THAT([&] { one.render(request); },
-              ThrowsMessage<Error>(HasSubstr("made for 1 surfaces, and 2 are given")));
+              ThrowsMessage<Error>(HasSubstr("made for 1 surface, and 2 are given")));
   for (const auto &options :
        {RendererOptions{.size = kSize, .pipeline = blocks_pipeline(), .max_surfaces = 2},
         RendererOptions{.size = kSize, .solver = {0, 4}, .max_surfaces = 2},

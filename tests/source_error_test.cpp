@@ -213,7 +213,7 @@ TEST(SourceError, DoublesBeyondFloat32AreRefused) {
     voxels[12] = large;
     ArrayReader reader(kDims, voxels, VoxelType::kFloat64);
     EXPECT_THAT([&] { compress(reader, {.rate = 8, .input = {.map_nan = 0.0f}}); },
-                ThrowsMessage<Error>(HasSubstr("1 of 6426 voxels are beyond")));
+                ThrowsMessage<Error>(HasSubstr("1 of 6426 voxels is beyond")));
   }
 }
 
