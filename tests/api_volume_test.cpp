@@ -49,6 +49,21 @@ TEST(Api, VolumesSayWhatTheyAre) {
   EXPECT_EQ(volume->value_range()[1], *std::ranges::max_element(voxels));
 }
 
+TEST(Api, AStepOfAFileIsAVolume) {
+  const test::TemporaryFolder folder;
+  std::string bytes = "NRRD0004\ntype: uint8\ndimension: 4\nsizes: 4 5 6 2\nencoding: raw\n\n";
+  std::vector<float> second;
+  for (int i = 0; i < 240; ++i) {
+    bytes += static_cast<char>(i);
+    if (i >= 120) second.push_back(static_cast<float>(i));
+  }
+  test::write_file(folder / "a.nrrd", bytes);
+  EXPECT_EQ(open_volume(folder / "a.nrrd", {}, {.step = 1})->decode(), second);
+  EXPECT_NE(open_volume(folder / "a.nrrd", {}, {.step = 0})->decode(), second);
+  EXPECT_THAT(error_of([&] { open_volume(folder / "a.nrrd", {}, {.step = 2}); }),
+              HasSubstr("step 2 of a file that has 2"));
+}
+
 TEST(Api, VolumesSuggestIsovalues) {
   const auto volume = sphere({});
   const std::vector<double> suggested = volume->suggested_isovalues();

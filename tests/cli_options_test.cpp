@@ -82,6 +82,16 @@ TEST(CliOptions, OnePassIsNamedSo) {
   EXPECT_NE(run.out.find(" 0 rays hit, 1 pass, "), std::string::npos) << run.out << run.err;
 }
 
+TEST(CliOptions, OneRayIsNamedSo) {
+  const TemporaryFolder folder;
+  const auto run = run_isowave("render " + kHead +
+                               " -i 80 --size 1x1 --device host --max-surface-error 0.5 -o " +
+                               quoted(folder / "a.png"));
+  EXPECT_NE(run.out.find(", view 0: 1 ray hits, "), std::string::npos) << run.out << run.err;
+  EXPECT_NE(run.out.find(" % of 1 ray (bound: "), std::string::npos) << run.out;
+  EXPECT_NE(run.out.find("\n  at full detail; chosen in "), std::string::npos) << run.out;
+}
+
 TEST(CliOptions, NumbersAreDecimalFiniteAndInRange) {
   for (const char *value : {"-1", "0", "GB", "18446744073709551616", "1e30GB", "99999999999EB",
                             "-1GB", "1.5GB", "1XB", " 1GB "})

@@ -120,8 +120,11 @@ TEST_F(CliSeries, StepsAreChosen) {
 }
 
 TEST_F(CliSeries, MoviesHaveStepsInTheirOrder) {
-  run(draw(pattern(), "-i 40 -i 60 --turntable 2 --steps 0:10:5 -o " + in("p.png") + " --movie " +
-                          in("m.mp4") + " --stats " + in("s.json")));
+  const std::string said =
+      run(draw(pattern(), "-i 40 -i 60 --turntable 2 --steps 0:10:5 -o " + in("p.png") +
+                              " --movie " + in("m.mp4") + " --fps 10 --stats " + in("s.json")))
+          .out;
+  EXPECT_THAT(said, HasSubstr("m.mp4: 12 pictures, 1.2 s at --fps 10\n"));
   EXPECT_FALSE(bytes("p_iso40_view1_step05.png").empty());
   std::vector<std::vector<int>> order;
   const json frames = json::parse(bytes("s.json"))["frames"];
