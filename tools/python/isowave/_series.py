@@ -123,8 +123,8 @@ def open_series(
     ----------
     source
         A pattern of files, as in a shell (*, ?, [a-z]), taken in natural order: step_2 before
-        step_10. TIFF files of one picture each are the layers of one step. Or a file with an axis
-        t beside z, y and x, a list of paths, or an array with the
+        step_10. TIFF files of one picture each are the layers of one step, in natural order. Or
+        a file with an axis t beside z, y and x, a list of paths, or an array with the
         axes (t, z, y, x), whose parts array[t] compress() takes.
     tolerance, relative_tolerance, rate, exact, levels, map_nan, no_data, num_threads
         As compress() has them, for each step.
@@ -255,7 +255,7 @@ def of_read_files(
 ) -> Series:
     """Steps that packages of Python read: files, or the entries of one file's axis t.
 
-    Several TIFF files of one picture each are the layers of the only step.
+    Several TIFF files of one picture each are the layers of the only step, in natural order.
     """
     files = [file for path in paths for file in files_of_pattern(path)]
     if len(files) > 1 and are_layers(files):

@@ -166,8 +166,10 @@ def stack(folder):
 
 
 def test_a_pattern_of_layers_is_a_volume(folder, monkeypatch):
-    """slices_10.tif comes after slices_9.tif, and the shell may have found the files."""
-    files = stack(folder)
+    """slices_10.tif comes after slices_9.tif, also if the shell, which thinks otherwise, has
+    found the files."""
+    files = sorted(map(str, stack(folder)))
+    assert files[0].endswith("slices_10.tif")
     monkeypatch.chdir(folder)
     volume = isowave.open("slices_*.tif", spacing=SPACING)
     assert np.array_equal(volume[...], VOXELS) and volume.spacing == SPACING

@@ -160,9 +160,13 @@ def source_of_file(
 def source_of_layers(
     files: Sequence[str], index: Index | None, spacing: Sequence[float] | None
 ) -> ArraySource:
-    """As source_of_file(), of TIFF files that are the layers of one volume, in their order."""
+    """As source_of_file(), of TIFF files that are the layers of one volume, in natural order.
+
+    A shell puts slices_10.tif before slices_9.tif.
+    """
+    layers = sorted(files, key=natural_order)
     with errors_with(files[0]):
-        return source_of(pick(tiff.read_layers(files, None), parse_index(index)), spacing=spacing)
+        return source_of(pick(tiff.read_layers(layers, None), parse_index(index)), spacing=spacing)
 
 
 def steps_of_file(path: str, dataset: str | None, index: Index | None) -> tuple[str, int] | None:
