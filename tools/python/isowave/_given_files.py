@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -132,11 +133,30 @@ def take_option(arguments: list[str], name: str) -> str | None:
     return None
 
 
-def with_nrrd(arguments: Sequence[str], files: Sequence[Given], folder: str) -> list[str]:
+def name_real_files(scene: str, names_of: Mapping[str, str]) -> None:
+    """Puts the names of files in place of those of their NRRD files, in a scene file."""
+    with open(scene, encoding="utf-8") as file:
+        text = file.read()
+    for nrrd, path in names_of.items():
+        if not os.path.isabs(path):
+            path = os.path.relpath(path, os.path.dirname(os.path.realpath(scene)))
+        text = text.replace(json.dumps(nrrd), json.dumps(path, ensure_ascii=False))
+    with open(scene, "w", encoding="utf-8") as file:
+        file.write(text)
+
+
+def with_nrrd(
+    arguments: Sequence[str],
+    files: Sequence[Given],
+    folder: str,
+    names_of: dict[str, str] | None = None,
+) -> list[str]:
     """Returns the arguments with NRRD files, written to `folder`, in place of these.
 
     --dataset and --index choose in each of them, --field-dataset and --field-index in that of
     --color-by. The program gets --no-data as a file says it. Raises Error in one line.
+
+    names_of  gets the files of these NRRD files
     """
     options = [*arguments]
     names = ("--dataset", "--index", "--field-dataset", "--field-index")
@@ -147,6 +167,7 @@ def with_nrrd(arguments: Sequence[str], files: Sequence[Given], folder: str) -> 
     says = {text.partition("=")[0] for text in options}
     changed: list[str | None] = [*arguments]
     more: list[str] = []
+    real = names_of if names_of is not None else {}
     for number, each in enumerate(files):
         paths = arguments[each.at : each.at + each.count] if each.count > 1 else [each.path]
         if each.is_field:
@@ -166,9 +187,12 @@ def with_nrrd(arguments: Sequence[str], files: Sequence[Given], folder: str) -> 
         ]
         if takes_no_data and written.no_data is not None and "--no-data" not in says:
             more = ["--no-data", repr(written.no_data)]
+        real[nrrd] = each.path if each.count == 1 else ""
     left = [text for text in changed if text is not None]
     for name in names:
         take_option(left, name)
+    if "--save-scene" in says and "" in real.values():
+        raise Error("--save-scene: a scene names one volume: put the layers' pattern in quotes")
     return left + more
 
 

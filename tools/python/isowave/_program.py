@@ -15,7 +15,7 @@ from typing import Any
 
 from isowave import _loader
 from isowave._core import Error
-from isowave._given_files import Given, given_files, with_nrrd
+from isowave._given_files import Given, given_files, name_real_files, take_option, with_nrrd
 from isowave.viewer import command
 
 PROGRAM = _loader.PACKAGE / "bin" / "isowave"
@@ -60,11 +60,15 @@ def run_with_nrrd(arguments: Sequence[str], files: Sequence[Given]) -> int:
     signal.signal(signal.SIGTERM, stop)
     try:
         with tempfile.TemporaryDirectory(prefix="isowave-") as folder:
-            changed = with_nrrd(arguments, files, folder)
+            names_of: dict[str, str] = {}
+            changed = with_nrrd(arguments, files, folder, names_of)
+            scene = take_option([*changed], "--save-scene")
             with subprocess.Popen([PROGRAM, *changed]) as process:
                 signal.signal(signal.SIGINT, lambda *_: None)  # Ctrl-C ends the program, too
                 signal.signal(signal.SIGTERM, lambda *_: process.terminate())
                 status = process.wait()
+            if scene is not None and status == 0:
+                name_real_files(scene, names_of)
     except (Error, OSError) as error:
         print(f"isowave: {error}", file=sys.stderr)
         return 1

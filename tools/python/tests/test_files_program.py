@@ -198,6 +198,28 @@ def test_a_pattern_of_layers_is_a_volume(folder, monkeypatch):
         isowave.open_series("slices_*.tif", dataset="1")
 
 
+def test_a_saved_scene_names_the_file(folder, monkeypatch):
+    """Not the NRRD file that the program got; from the scene's folder."""
+    files = [str(file) for file in stack(folder)]
+    monkeypatch.chdir(folder)
+    write.ome_tiff(folder / "heat.tif")
+    (folder / "scenes").mkdir()
+    look = ("-i", 20, "--device", "host", "--size", "32x24", "--color-by", "heat.tif,0,40")
+    save = ("--save-scene", "scenes/s.json")
+    done = command("render", "slices_*.tif", *look, "-o", "a.png", *save)
+    assert done.returncode == 0, done.stderr
+    scene = json.loads(pathlib.Path("scenes/s.json").read_text())
+    assert (scene["volume"], scene["field"]) == ("../slices_*.tif", "../heat.tif")
+    image = isowave.open_scene("scenes/s.json").render(size=(32, 24), device="host")
+    image.save("b.png")
+    assert pathlib.Path("a.png").read_bytes() == pathlib.Path("b.png").read_bytes()
+    done = command("render", *files, *look, "-o", "a.png", *save)
+    assert (done.returncode, done.stderr) == (
+        1,
+        "isowave: --save-scene: a scene names one volume: put the layers' pattern in quotes\n",
+    )
+
+
 def test_a_pattern_of_volumes_is_a_series(folder, monkeypatch):
     monkeypatch.chdir(folder)
     for t in (2, 10):
