@@ -189,7 +189,7 @@ TEST_F(CliSeries, AnIndexIsOneVolumeOfAFile) {
   run(draw(four, "-i 60 -o " + in("i.png")));
   run(draw(alone, "-i 60 -o " + in("a.png")));
   EXPECT_EQ(bytes("i.png"), bytes("a.png"));
-  run(draw(pattern(), "-i 60 --steps 10 -o " + in("last.png")));
+  run(draw(in("b10_16x16x16_uint8.raw"), "-i 60 -o " + in("last.png")));
   EXPECT_NE(bytes("a.png"), bytes("last.png")) << "else the steps are not told apart";
   run("convert " + four + "-o " + in("i.zfp"));
   run("convert " + alone + " -o " + in("a.zfp"));
@@ -207,9 +207,9 @@ TEST_F(CliSeries, AnIndexIsOneVolumeOfAFile) {
   const std::string same = run("compare " + four + in("four.nrrd") + " -i 60 --size 32x24").out;
   EXPECT_THAT(same, HasSubstr("equal: all bits of 4096 voxels"));
   // The field of a surface has an index of its own.
-  for (const auto &[field, name] : {std::pair{in("four.nrrd") + ",90,140 --field-index t=10", "f"},
-                                    std::pair{in("b10_16x16x16_uint8.raw") + ",90,140", "g"},
-                                    std::pair{in("four.nrrd") + ",90,140", "own"}})
+  for (const auto &[field, name] : {std::pair{in("four.nrrd") + ",40,120 --field-index t=10", "f"},
+                                    std::pair{in("b10_16x16x16_uint8.raw") + ",40,120", "g"},
+                                    std::pair{in("four.nrrd") + ",40,120", "own"}})
     run(draw(four, "-i 60 --color-by " + field + " -o " + in(name + std::string(".png"))));
   EXPECT_EQ(bytes("f.png"), bytes("g.png"));
   EXPECT_NE(bytes("f.png"), bytes("own.png"));
@@ -229,8 +229,10 @@ TEST_F(CliSeries, AnIndexThatCannotBeIsOneLine) {
   for (const std::string &volume : {one, std::string("generate:sphere_8x8x8_uint8")})
     expect_one_line_error(convert(volume + " --index t=1"),
                           "index t=1: it is one volume: leave the index out");
-  for (const char *command : {"info ", "render --device host ", "extract --device cpu "})
+  for (const char *command : {"info ", "render --device host "})
     expect_one_line_error(command + in("v.zfp") + " --index t=2", "index t=2: it is one volume");
+  EXPECT_THAT(test::run_isowave("extract --device cpu " + in("v.zfp") + " --index t=2").err,
+              HasSubstr("index t=2: it is one volume"));
   run("info " + in("v.zfp") + " --index t=0");
   expect_one_line_error(draw(in("four.nrrd"), "-i 60 --index t=1 --steps 0:2"),
                         "VOLUME is no series");

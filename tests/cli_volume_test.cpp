@@ -192,7 +192,7 @@ TEST(Cli, BadInputIsOneLineAndLeavesNothing) {
   std::vector<float> voxels(64, 1.0f);
   voxels[21] = INFINITY;
   write_file(folder / "l_4x4x4_float32.raw", voxels);
-  expect_one_line_error("convert " + quoted(folder / "l_4x4x4_float32.raw") + to, "(1,1,1)");
+  expect_one_line_error("convert " + quoted(folder / "l_4x4x4_float32.raw") + to, "x=1, y=1, z=1");
   EXPECT_EQ(out.num_files(), 0u);
   EXPECT_EQ(
       run_isowave("convert " + quoted(folder / "l_4x4x4_float32.raw") + " --map-nan 0" + to).status,
