@@ -59,7 +59,9 @@ TEST_F(VoxelFilesOf, EachWithSomeOfTheAxes) {
   expect_read("a.nhdr", listed_nrrd("data file: LIST 3\n" + all));
   expect_read("a.nhdr", listed_nrrd("data file: LIST 1\n" + rows));
   expect_read("a.nhdr", listed_nrrd("datafile:  LIST \t3\r\nall_0.raw\r\n"));
-  expect_read("a.nhdr", listed_nrrd("data file: LIST 1\n" + voxels, "1 3 4 5"));
+  expect_read(
+      "a.nhdr",
+      listed_nrrd("kinds: vector domain domain domain\ndata file: LIST 1\n" + voxels, "1 3 4 5"));
   expect_read("a.nhdr", listed_nrrd("data file: LIST\n" + layers + "\nno name"));
   expect_read("a.nhdr", listed_nrrd("data file: layer_%d.raw 0 4 1\n"));
   expect_read("a.nhdr", listed_nrrd("data file: row_%d.raw 0 19 1 1\n"));
@@ -152,7 +154,7 @@ TEST_F(VoxelFilesOf, AreRefusedInOneLine) {
   std::string names;
   for (int i = 0; i < 1 << 20; ++i) names += "x\n";
   refused("LIST\n" + names + "x", "more than 1048576 names");
-  expect_refused("a.nhdr", listed_nrrd("data file: s%d 0 4 1\n", "65536 65536 65536 65536"),
+  expect_refused("a.nhdr", listed_nrrd("data file: s%d 0 3 1 4\n", "65536 65536 65536 65536"),
                  "more voxels than files have");
   write_file(folder_ / "layer_3.raw", std::string(11, 'x'));
   refused("LIST\n" + layers,
