@@ -93,6 +93,7 @@ bool read_nrrd_fields(HeaderLines &lines, const std::string &what, HeaderFields 
       if (lines.is_cut()) throw Error("{}: broken header: '{}' is too long", what, name);
       fields.add(name, trim(line.substr(colon + 2)));
       if (name == "data file") files = read_voxel_file_names(fields, name, lines);
+      if (files && !files->list.empty()) return false;  // a list ends the header
     } else if (line.find(":=") == line.npos) {
       throw Error("{}: broken header: line {}, {}, is neither a field of NRRD nor a key/value pair",
                   what, lines.number(), quote(line));
