@@ -221,8 +221,7 @@ void check_options(const CLI::App &command, const RenderArgs &options, const Tea
   check_slice_options(command, options);
   check_movie_options(command, options);
   if (!options.color_map.by_field)
-    refuse_options(command, {"--field-index"},
-                   "no file's values colour the surface: leave it out");
+    refuse_options(command, {"--field-index"}, "no file's values colour the surface: leave it out");
   if (team.size() > 1) {
     refuse_options(command, {"--reference", "--verbose"},
                    fmt::format("cannot be used with mpirun: {} processes draw parts of the volume",
