@@ -29,6 +29,7 @@ from browser_pages import (
     fake_scene,
     isovalue,
     keep,
+    menu,
     open_page,
     page,
     rests,
@@ -51,8 +52,8 @@ def test_a_files_name_is_text_in_the_page(open_page: Callable[..., Any]) -> None
         page = open_page()
         page.goto(server.url)
         rests(page)
-        assert page.locator("h1").inner_text() == name
-        assert page.locator("h1 *").count() == 0 and not page.problems
+        assert page.locator(".title").inner_text() == name
+        assert page.locator(".title *").count() == 0 and not page.problems
 
 
 def test_a_picture_with_fewer_rays_than_asked_for_says_so(open_page: Callable[..., Any]) -> None:
@@ -104,7 +105,7 @@ def test_the_page_loads_without_errors_or_foreign_requests(
 
 def test_the_picture_is_the_renderers(page: Any, server: Server) -> None:
     name, data = screenshot(page)
-    assert name == "isowave_80.png"
+    assert name == "ball_80.png"
     shot = Image.open(io.BytesIO(data))
     assert shot.format == "PNG"
     volume = FakeVolume()
@@ -228,10 +229,10 @@ def test_colours_and_quality(page: Any) -> None:
     keep(page, "colours")
 
     def quality() -> None:
-        type_into(page.get_by_label("Largest error"), "0.5")
+        type_into(page.get_by_label("Accurate to"), "0.5")
         page.keyboard.press("Enter")
-        page.get_by_label("Samples per pixel").select_option("4")
-        page.get_by_label("Ambient rays").select_option("8")
+        page.get_by_label("Rays per pixel").select_option("4")
+        page.get_by_label("Soft shade").select_option("8")
 
     quality()
     rests(page)
@@ -240,11 +241,11 @@ def test_colours_and_quality(page: Any) -> None:
     assert "4 rays a pixel" in page.locator(".facts").inner_text()
     assert "within 0.5 px" in page.locator(".facts").inner_text()
     # A frame keeps an error or a time; what was given last counts.
-    type_into(page.get_by_label("Time budget"), "200")
+    type_into(page.get_by_label("Time per picture"), "200")
     page.keyboard.press("Enter")
     rests(page)
     assert state(page)["ms"] == "200" and "error" not in state(page)
-    assert page.get_by_label("Largest error").input_value() == ""
+    assert page.get_by_label("Accurate to").input_value() == ""
 
 
 def test_three_clients_keep_their_isovalues(open_page: Callable[..., Any], server: Server) -> None:
@@ -350,14 +351,14 @@ def test_cameras_are_copied_and_pasted(page: Any) -> None:
     if not FIREFOX:
         page.context.grant_permissions(["clipboard-read", "clipboard-write"])
     picture = page.evaluate(DRAWN)
-    page.get_by_role("button", name="Copy camera").click()
+    menu(page, "camera").get_by_role("button", name="Copy camera").click()
     page.get_by_text("Copied").first.wait_for()
     text = page.evaluate("navigator.clipboard.readText()")
     file = json.loads(text)
     assert file["fovy_deg"] == 60 and set(file["cameras"][0]) == {"eye", "at", "up"}
     assert [file["width"], file["height"]] == picture[:2]
     assert changes(page, lambda: drag(page, 100, 0))
-    page.get_by_role("button", name="Paste camera").click()
+    menu(page, "camera").get_by_role("button", name="Paste camera").click()
     page.get_by_label("Camera file (JSON)").fill(text)
     assert changes(page, lambda: page.get_by_role("button", name="Use it").click())
     assert page.evaluate(DRAWN) == picture
@@ -385,7 +386,7 @@ def test_cameras_are_copied_and_pasted(page: Any) -> None:
     ],
 )
 def test_a_bad_camera_gets_a_readable_message(page: Any, text: str, message: str) -> None:
-    page.get_by_role("button", name="Paste camera").click()
+    menu(page, "camera").get_by_role("button", name="Paste camera").click()
     page.get_by_label("Camera file (JSON)").fill(text)
     page.get_by_role("button", name="Use it").click()
     assert message in page.locator(".problem").inner_text()
@@ -397,7 +398,7 @@ def test_a_bad_camera_gets_a_readable_message(page: Any, text: str, message: str
 
 
 def test_a_memory_budget_is_shown_and_set(page: Any, server: Server) -> None:
-    field = page.get_by_label("Memory budget")
+    field = page.get_by_label("Device memory")
     assert (
         field.input_value() == "" and "95 MiB of 1,024 MiB" in page.locator(".device").inner_text()
     )
@@ -423,7 +424,7 @@ def test_a_narrow_window_shows_everything(open_page: Callable[..., Any], server:
     rests(page)
     assert page.evaluate(f"{frame}.scrollWidth <= 320 && document.body.scrollWidth <= 320")
     keep(page, "narrow_panel")
-    for name in ("Reset view", "Paste camera"):
+    for name in ("Reset view", "Add plane"):
         button = page.get_by_role("button", name=name)
         button.scroll_into_view_if_needed()
         box = button.bounding_box()
@@ -472,9 +473,11 @@ def test_text_has_contrast(open_page: Callable[..., Any], server: Server, scheme
     page = open_page(color_scheme=scheme, reduced_motion="reduce")
     page.goto(server.url)
     rests(page)
-    page.get_by_text("Keys and gestures").click()
     keep(page, scheme)
     ratios = page.evaluate(CONTRAST)
+    for name in ("file", "camera", "export", "info", "help"):
+        menu(page, name)
+        ratios += page.evaluate(CONTRAST)
     assert len(ratios) > 25
     assert [(name, ratio) for name, ratio in ratios if ratio < 4.5] == []
     moving = "getComputedStyle(document.querySelector('main').shadowRoot.querySelector('.bar'))"
@@ -520,7 +523,7 @@ def test_nothing_that_is_done_in_the_page_is_malformed(page: Any) -> None:
             new KeyboardEvent("keydown", { key: "ArrowUp", bubbles: true }));
     }"""
     )
-    for name in ("Isovalue", "Largest error", "Time budget", "Memory budget"):
+    for name in ("Isovalue", "Accurate to", "Time per picture", "Device memory"):
         for value in ("1e300", "-1e300", "1e-300"):
             type_into(page.get_by_label(name, exact=name == "Isovalue").last, value)
             page.keyboard.press("Enter")
@@ -564,7 +567,7 @@ def test_a_budget_that_is_too_small_says_what_would_do(open_page: Callable[..., 
         page = open_page()
         page.goto(server.url)
         rests(page)
-        type_into(page.get_by_label("Memory budget"), "1")
+        type_into(page.get_by_label("Device memory"), "1")
         page.keyboard.press("Enter")
         page.get_by_text("needs 20 MiB").wait_for()
         page.wait_for_function("() => document.querySelector('main').dataset.state === 'ready'")

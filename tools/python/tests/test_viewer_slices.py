@@ -48,7 +48,7 @@ def test_slices_are_added_moved_and_removed(open_page: Callable[..., Any]) -> No
         page = open_page()
         page.goto(server.url)
         assert asked(page, volume).slices == () and not page.locator(".slice_look").is_visible()
-        type_into(page.get_by_label("Largest error"), "1")
+        type_into(page.get_by_label("Accurate to"), "1")
         page.keyboard.press("Enter")
         assert asked(page, volume).max_error == 1
         button(page, "Add z").click()
@@ -87,7 +87,7 @@ def test_slices_are_added_moved_and_removed(open_page: Callable[..., Any]) -> No
         assert asked(page, volume).slices == moved[1:]
         button(page, "Remove slice 1").click()
         assert asked(page, volume).max_error == 1 and "slices" not in state(page)
-        assert page.get_by_label("Largest error").is_enabled() and not page.problems
+        assert page.get_by_label("Accurate to").is_enabled() and not page.problems
 
 
 def test_addresses_of_slices(open_page: Callable[..., Any]) -> None:  # noqa: F811
