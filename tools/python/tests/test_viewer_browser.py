@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import struct
 import threading
 from collections.abc import Callable
@@ -22,8 +23,8 @@ from browser_pages import (
     FIREFOX,
     answer_from_files,
     browser,
+    button,
     changes,
-    double_click,
     drag,
     eye,
     fake_scene,
@@ -147,16 +148,26 @@ def test_other_drags_move_the_surface(page: Any) -> None:
     assert eye(page) == pytest.approx(before, abs=1e-5)
 
 
-def test_the_wheel_zooms_and_a_double_click_resets(page: Any) -> None:
+def test_the_wheel_zooms_to_the_cursor_and_reset_goes_back(page: Any) -> None:
     home, picture = eye(page), page.evaluate(DRAWN)
+    box = page.locator(".picture").bounding_box()
+    x, y = box["x"] + box["width"] * 0.6, box["y"] + box["height"] * 0.4
 
     def wheel() -> None:
-        page.mouse.move(300, 300)
+        page.mouse.move(x, y)
         page.mouse.wheel(0, -300)
 
     assert changes(page, wheel)
     assert abs(eye(page)[2] - 31.5) < abs(home[2] - 31.5)
-    assert changes(page, lambda: double_click(page, 300, 300))
+    # What was under the cursor, as deep as the middle, still is.
+    half = math.tan(math.radians(30))
+    seen = []
+    for place in (home, eye(page)):
+        away = place[2] - 31.5
+        high = (x - box["x"] - box["width"] / 2) / box["height"], 0.1
+        seen.append(place[:2] + 2 * half * away * np.array(high))
+    assert seen[0] == pytest.approx(seen[1], abs=1e-3)
+    assert changes(page, lambda: button(page, "Reset view").click())
     assert page.evaluate(DRAWN) == picture
     assert eye(page) == pytest.approx(home)
 
@@ -164,10 +175,13 @@ def test_the_wheel_zooms_and_a_double_click_resets(page: Any) -> None:
 def test_keys_do_all_that_the_mouse_does(page: Any) -> None:
     home, picture = eye(page), page.evaluate(DRAWN)
     page.get_by_role("application").focus()
-    for keys in ("ArrowLeft", "ArrowUp", "Shift+ArrowRight", "+", "-", "+"):
+    for keys in ("ArrowLeft", "ArrowUp", "Shift+ArrowRight", "+", "-", "+", "q", "e", "e"):
         assert changes(page, lambda: page.keyboard.press(keys)), keys
-    assert changes(page, lambda: page.keyboard.press("0"))
-    assert page.evaluate(DRAWN) == picture and eye(page) == pytest.approx(home)
+    for key in ("0", "r"):
+        assert changes(page, lambda: page.keyboard.press(key))
+        assert page.evaluate(DRAWN) == picture and eye(page) == pytest.approx(home)
+        assert changes(page, lambda: page.keyboard.press("3"))
+    assert changes(page, lambda: page.keyboard.press("R"))
     assert not changes(page, lambda: page.keyboard.press("x"))
 
 
@@ -179,10 +193,12 @@ def test_the_focus_goes_through_everything_in_order_and_is_seen(page: Any) -> No
         if (!e) return null;
         const style = getComputedStyle(e);
         const named = e.ariaLabel || e.labels?.[0]?.innerText || e.innerText || e.title;
-        return { name: e.name || e.className || e.localName, label: Boolean(named?.trim()),
+        const tick = e.dataset.value ? "tick" : "";
+        const name = e.name || tick || e.dataset.side || e.className || e.localName;
+        return { name, label: Boolean(named?.trim()),
           visible: style.outlineStyle !== "none" && parseFloat(style.outlineWidth) >= 2 };
     }"""
-    for _ in range(50):
+    for _ in range(80):
         page.keyboard.press("Tab")
         at = page.evaluate(focused)
         if at is None:
@@ -191,11 +207,15 @@ def test_the_focus_goes_through_everything_in_order_and_is_seen(page: Any) -> No
         seen.append(at["name"])
     if FIREFOX:  # whose keys scroll it from there
         seen.remove("panel")
-    expected = "picture toggle isovalue slider reset shot copy paste save_scene open_scene"
-    expected += " color value opacity add add_labels light color_map background gradient"
+    expected = "file_menu share camera_menu export_menu info_menu help_menu toggle picture"
+    expected += "".join(f" tool_{t}" for t in "orbit pan measure clip slice pivot".split())
+    expected += " reset front isovalue slider log zoom_in zoom_all zoom_out"
+    expected = expected.replace("isovalue slider", "isovalue tick tick slider")
+    expected += " color value opacity add peak add_labels"
     expected += "".join(f" clip_{axis}_from clip_{axis}_to" for axis in "xyz")
-    expected += " caps slice_x slice_y slice_z scale-bar axes caption units title"
-    expected += " max_error by samples ambient time_budget budget summary"
+    expected += " add_plane caps slice_x slice_y slice_z colour_by color_map preset background"
+    expected += " summary light gradient summary scale-bar axes caption units title"
+    expected += " summary max_error by samples ambient time_budget budget"
     assert seen == expected.split()
 
 
@@ -347,56 +367,6 @@ def test_the_url_restores_the_state(
     assert state(page)["iso"] == "33" and page.problems == []
 
 
-def test_cameras_are_copied_and_pasted(page: Any) -> None:
-    if not FIREFOX:
-        page.context.grant_permissions(["clipboard-read", "clipboard-write"])
-    picture = page.evaluate(DRAWN)
-    menu(page, "camera").get_by_role("button", name="Copy camera").click()
-    page.get_by_text("Copied").first.wait_for()
-    text = page.evaluate("navigator.clipboard.readText()")
-    file = json.loads(text)
-    assert file["fovy_deg"] == 60 and set(file["cameras"][0]) == {"eye", "at", "up"}
-    assert [file["width"], file["height"]] == picture[:2]
-    assert changes(page, lambda: drag(page, 100, 0))
-    menu(page, "camera").get_by_role("button", name="Paste camera").click()
-    page.get_by_label("Camera file (JSON)").fill(text)
-    assert changes(page, lambda: page.get_by_role("button", name="Use it").click())
-    assert page.evaluate(DRAWN) == picture
-    assert not page.get_by_label("Camera file (JSON)").is_visible()
-
-
-@pytest.mark.parametrize(
-    "text, message",
-    [
-        ("", "This is no camera: it must be JSON"),
-        ("{}", '"cameras" with "eye", "at" and "up" is missing'),
-        ('{"cameras": [{"eye": [0, 0], "at": [0, 0, 0]}]}', '"eye" must be three numbers'),
-        ('{"cameras": [{"eye": [1, 2, 3], "at": [1, 2, 3]}]}', "are the same point"),
-        ('{"cameras": [{"eye": [0, 5, 0], "at": [0, 0, 0]}]}', "parallel to the view"),
-        (
-            '{"fovy_deg": 200, "cameras": [{"eye": [0, 0, 5], "at": [0, 0, 0]}]}',
-            "between 0 and 180",
-        ),
-        (
-            '{"fovy_deg": "x", "cameras": [{"eye": [0, 0, 5], "at": [0, 0, 0]}]}',
-            "between 0 and 180",
-        ),
-        ('{"cameras": [{"eye": [1e30, 0, 5], "at": [0, 0, 0]}]}', "too large"),
-        ("[" * 3000, "This is no camera"),
-    ],
-)
-def test_a_bad_camera_gets_a_readable_message(page: Any, text: str, message: str) -> None:
-    menu(page, "camera").get_by_role("button", name="Paste camera").click()
-    page.get_by_label("Camera file (JSON)").fill(text)
-    page.get_by_role("button", name="Use it").click()
-    assert message in page.locator(".problem").inner_text()
-    if "same point" in message:
-        keep(page, "bad_camera")
-    page.keyboard.press("Escape")
-    assert not page.get_by_label("Camera file (JSON)").is_visible()
-    assert page.problems == []
-
-
 def test_a_memory_budget_is_shown_and_set(page: Any, server: Server) -> None:
     field = page.get_by_label("Device memory")
     assert (
@@ -425,9 +395,8 @@ def test_a_narrow_window_shows_everything(open_page: Callable[..., Any], server:
     assert page.evaluate(f"{frame}.scrollWidth <= 320 && document.body.scrollWidth <= 320")
     keep(page, "narrow_panel")
     for name in ("Reset view", "Add plane"):
-        button = page.get_by_role("button", name=name)
-        button.scroll_into_view_if_needed()
-        box = button.bounding_box()
+        button(page, name).scroll_into_view_if_needed()
+        box = button(page, name).bounding_box()
         assert box["x"] >= 0 and box["x"] + box["width"] <= 320
     # On a display of twice the density the picture has twice the pixels. Firefox's has a scrollbar
     # beside it.

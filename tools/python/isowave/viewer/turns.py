@@ -138,8 +138,9 @@ class Frame:
     @property
     def is_better_than_before(self) -> bool:
         """Whether a pass shows more than the page does; pictures within a time do by themselves."""
-        is_timed = self.wish.request.time_budget is not None
-        return self.stage is not Stage.FIRST and (self.client.under is not None or is_timed)
+        request = self.wish.request
+        is_shown = self.client.under is not None or request.time_budget is not None
+        return self.stage is not Stage.FIRST and is_shown and not request.transparent
 
 
 class Turns:
