@@ -1,4 +1,4 @@
-"""Files: exported pictures, the command that draws the same, scenes that are dropped, recent ones."""
+"""Files: exported pictures, the command that draws the same, dropped and recent scenes."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-// clip.js -- clipping: sliders for the part of the volume that is drawn, and planes. A part of an ES module
-// (front_end.py).
+// clip.js -- clipping: sliders for the part of the volume that is drawn, and planes. A part of an
+// ES module (front_end.py).
 
 const WHOLE = [0, 100, 0, 100, 0, 100]; // clip of a State that leaves out nothing
 const LEAST_CLIP = 1; // between both ends of an axis [%]

@@ -47,7 +47,7 @@ class Hits:
 
 
 def _unit(v: NDArray[Any]) -> NDArray[Any]:
-    return v / np.linalg.norm(v)
+    return np.asarray(v / np.linalg.norm(v))
 
 
 def value_at(volume: VolumeLike, position: NDArray[np.float64]) -> float | None:

@@ -281,7 +281,8 @@ class Look {
     view.field("color_by").value = map && map.by !== "depth" ? byName(map) : "z";
     view.field("color_by").disabled = !map || map.by === "depth";
     for (const name of ["color_by", "color_low", "color_high"]) {
-      view.find(`label:has([name=${name}])`).hidden = !map;
+      const isDepth = name === "color_by" && map?.by === "depth";
+      view.find(`label:has([name=${name}])`).hidden = !map || isDepth;
     }
     for (const end of this.range.ends) end.disabled = !map || map.by === "labels";
     this.range.show(map?.range);

@@ -42,7 +42,7 @@ const HELP_POP = `<p id="keys">Drag, one finger or arrow keys: turn.
 const HTML = `
 <div class="frame starting">
   <div class="top" role="group" aria-label="File and camera">
-    <span class="brand" aria-hidden="true">isowave</span>
+    <h1 class="brand">isowave</h1>
     ${menu("file", '<span class="title">isowave</span>', "File", FILE_POP)}
     <span class="gap"></span>
     <button type="button" name="undo" aria-label="Undo" title="Undo (Ctrl+Z)">${UNDO}</button>

@@ -88,8 +88,8 @@ class Extent:
         return replace(self, ambient=0, shadow=0, bounce=0)
 
     def within(self, max_rays: int, max_all_rays: int) -> Extent:
-        """A smaller extent: it has fewer rays per pixel, then fewer pixels, then fewer ambient rays,
-        then fewer shadow rays.
+        """A smaller extent: it has fewer rays per pixel, then fewer pixels, then fewer ambient
+        rays, then fewer shadow rays.
 
         max_rays bounds the camera's rays, max_all_rays those of the hits, too.
         """
@@ -186,7 +186,7 @@ def laid_over(
     return np.where(is_behind, under, rgb)
 
 
-def rgb_floats(color: object) -> NDArray[np.float64]:
+def rgb_floats(color: Any) -> NDArray[np.float64]:
     return np.array(optional_color(color), np.float64)
 
 

@@ -18,7 +18,8 @@ const PRESET_ROWS = segments("preset", "Look", { draft: "Draft", good: "Good", p
 
 /** HTML of the panel's rows. */
 const QUALITY_ROWS = `
-    <label title="How far the surface may be off, on the screen">Accurate to <span class="unit"><input name="max_error" type="number" step="any"
+    <label title="How far the surface may be off, on the screen">Accurate to
+      <span class="unit"><input name="max_error" type="number" step="any"
       placeholder="none"> <span class="of_error"></span></span></label>
     <label title="The surface, by proof or by a sample; or the whole picture, as an eye sees it">
       Judged by <select name="by">${
@@ -32,7 +33,8 @@ const QUALITY_ROWS = `
       <select name="ambient"><option value="0">none</option>${
   AMBIENT.map((n) => `<option value="${n}">${n} rays</option>`).join("")
 }</select></label>
-    <label title="The best picture within this time">Time per picture <span class="unit"><input name="time_budget" type="number"
+    <label title="The best picture within this time">Time per picture
+      <span class="unit"><input name="time_budget" type="number"
       min="1" max="10000" step="any"
       placeholder="none"> ms</span></label>`;
 

@@ -8,11 +8,10 @@
 
 The newest wish of a client counts; it cancels the frame of the one before. A wish is drawn in
 stages: a first picture of a quarter of the width and height; if it asks for more than a ray a
-pixel, a sharp picture of one; the whole picture (each sent as JPEG, and after passes if nothing is
-on the page that is better); once the client rests, the lossless picture (PNG), and what is certain of it. Clients take
-turns, stage by stage; a long picture gives way to smaller ones between two passes. At most two
-pictures are on the way to a client; of those that wait for it only the last is kept, and it is
-always sent.
+pixel, a sharp picture of one; the whole picture (sent as JPEG, after passes over the first one);
+once the client rests, the lossless picture (PNG), and what is certain of it. Clients take turns; a
+long picture gives way to smaller ones between two passes. At most two pictures are on the way to a
+client; of those that wait for it only the last is kept, and it is always sent.
 """
 
 from __future__ import annotations
@@ -195,8 +194,8 @@ class Scene:
                 client.post(messages.error(RuntimeError(TOO_MANY_BUDGETS), None), None)
             elif isinstance(message, SceneFile):
                 client.post(messages.scene(message.text), None)
-            elif isinstance(message, Probe):
-                self._do(lambda: self._answer(client, message))
+            elif isinstance(message, Probe) and client.asks(message):
+                self._do(lambda: self._answer(client))
             self._changed.notify_all()
 
     @property
@@ -405,13 +404,16 @@ class Scene:
         title = self._title if names is None else names[wish.step]
         return annotate(picture, whole, wish.annotations, title, frame.ranges)
 
-    def _answer(self, client: Client, probe: Probe) -> None:
-        """Says what is seen at a place of the client's last picture."""
-        with self._changed:
-            hits, volume, field = client.hits, self._steps.volume, self._field
-            is_there = hits is not None and hits.step == self._steps.drawn
-        place = seen(hits, probe.at, volume, field) if hits is not None and is_there else {}
-        client.post({"type": "probe", "id": probe.id, **messages.NOTHING, **place}, None)
+    def _answer(self, client: Client) -> None:
+        """Says what is seen at places of the client's last picture."""
+        while True:
+            with self._changed:
+                probe, hits, volume = client.next_probe(), client.hits, self._steps.volume
+                if probe is None:
+                    return
+                is_there = hits is not None and hits.step == self._steps.drawn
+            place = seen(hits, probe.at, volume, self._field) if hits and is_there else {}
+            client.post({"type": "probe", "id": probe.id, **messages.NOTHING, **place}, None)
 
     def _on_pass(self, frame: Frame, so_far: ProgressLike) -> bool:
         """Sends the picture so far if it is worth it. False: the frame is to stop."""
@@ -541,16 +543,8 @@ class Scene:
             self._isovalue = self._first_isovalue()
         shown = self._first if self._shows_volume else self._field
         field = None if shown is None else messages.field(shown, self._field_name)
-        self._facts = messages.welcome(
-            self._first,
-            self._title,
-            self._range,
-            self._isovalue,
-            self._first_scene,
-            self._first_annotations,
-            field,
-            self._steps.names,
-        )
+        first = self._range, self._isovalue, self._first_scene, self._first_annotations
+        self._facts = messages.welcome(self._first, self._title, *first, field, self._steps.names)
         with self._changed:
             self._prepared = True
             for client in list(self._turns.clients):

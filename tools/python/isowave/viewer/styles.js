@@ -26,12 +26,14 @@ const CSS = `
 .top { grid-area: top; display: flex; align-items: center; gap: 4px; min-height: 40px;
   padding: 0 8px 0 12px; background: var(--card); border-bottom: 1px solid var(--line);
   z-index: 3; }
-.brand { color: var(--soft); font-weight: 600; letter-spacing: .01em; margin-right: 4px; }
+.brand { color: var(--soft); font-size: inherit; font-weight: 600; letter-spacing: .01em;
+  margin: 0 4px 0 0; }
 .gap { flex: 1; }
 .top button { border-color: transparent; min-width: 30px; }
 .top button:hover, .top [aria-expanded=true] { background: var(--high); }
 .top > button, .menu > button { padding: 0 8px; }
-.menu { position: relative; min-width: 0; }
+.menu { position: relative; flex: none; }
+.menu.file { flex: 0 1 auto; min-width: 0; }
 .menu.file > button { display: flex; align-items: center; max-width: 100%; font-weight: 600; }
 .file > button::after, .camera > button::after, .export > button::after { content: " ▾";
   white-space: pre; color: var(--soft); }
@@ -223,16 +225,18 @@ summary { cursor: pointer; color: var(--soft); font-weight: 600; font-size: 12px
   .tools button { height: 26px; }
   .cube { width: 64px; height: 64px; }
   .iso { padding: 6px 12px 3px; }
+  .below { left: 64px; }
 }
 @container (max-width: 760px) {
-  .brand, .top [name=share] { display: none; }
+  .brand { position: absolute; clip-path: inset(50%); }
+  .top [name=share] { display: none; }
   .panel { width: 248px; }
 }
 @container (max-width: 640px) {
   .frame { grid: auto minmax(0, 1fr) / minmax(0, 1fr); grid-template-areas: "top" "stage"; }
   .top { padding: 0 4px; gap: 0; }
   .menu { position: static; }
-  .top > button, .menu > button { padding: 0 6px; }
+  .top > button, .menu > button { padding: 0 5px; min-width: 26px; }
   .camera > button::after, .export > button::after { content: none; }
   .pop, .file .pop { inset: 44px 8px auto; width: auto; }
   .sheet { display: flex; flex-direction: column; position: absolute; inset: auto 0 0;
@@ -243,6 +247,7 @@ summary { cursor: pointer; color: var(--soft); font-weight: 600; font-size: 12px
   .grip::after { content: ""; display: block; width: 40px; height: 4px; margin: auto;
     border-radius: 2px; background: var(--edge); }
   [data-stop="1"] .sheet { height: 52cqh; }
+  [data-stop="1"].frame { grid-template-rows: auto calc(48cqh - 32px); align-content: start; }
   [data-stop="2"] .sheet { height: calc(100cqh - 48px); }
   .iso, .time { flex: none; border: 0; padding: 0 10px 6px; gap: 10px; }
   .iso .number { width: 84px; }

@@ -9,7 +9,8 @@ const TOOLS = { // what they are called, what they do, what they look like
     "m1.5 11 9.5-9.5 3.5 3.5L5 14.5zM4 8.5 5.5 10M6.5 6 8 7.5M9 3.5 10.5 5"],
   clip: ["Clip", "Handles of the box and of planes; a click cuts away what is in front",
     "M2 4.5 8 2l6 2.5v7L8 14l-6-2.5zM2 4.5 8 7l6-2.5M8 7v7"],
-  slice: ["Slice", "Handles of slices; a click puts one there", "M1 10.5 5.5 5H15l-4.5 5.5zM4 13h7"],
+  slice: ["Slice", "Handles of slices; a click puts one there",
+    "M1 10.5 5.5 5H15l-4.5 5.5zM4 13h7"],
   pivot: ["Pivot", "Click: turn about that point (or double click)",
     "M8 1v4M8 11v4M1 8h4M11 8h4M8 5.5a2.5 2.5 0 1 1 0 5 2.5 2.5 0 0 1 0-5z"],
 };

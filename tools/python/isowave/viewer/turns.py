@@ -15,7 +15,7 @@ from isowave._camera import Camera
 
 from .hits import Hits
 from .pictures import Extent
-from .protocol import ProtocolError, Wish
+from .protocol import Probe, ProtocolError, Wish
 from .steps import Steps
 
 MAX_IN_FLIGHT: Final = 2  # pictures on the way to a client
@@ -71,6 +71,19 @@ class Client:
     whole_seconds: float = math.inf  # of the last whole picture
     shown: float = -math.inf  # when the last picture was sent
     joined: bool = True
+    probe: Probe | None = None  # the last one that waits for an answer
+    is_answered: bool = False  # by a thread
+
+    def asks(self, probe: Probe) -> bool:
+        """Keeps a probe, in place of one that waits. Returns whether nobody answers them yet."""
+        is_first, self.probe, self.is_answered = not self.is_answered, probe, True
+        return is_first
+
+    def next_probe(self) -> Probe | None:
+        """The one to answer; None: there is none, and the next one needs a thread."""
+        probe, self.probe = self.probe, None
+        self.is_answered = probe is not None and self.joined
+        return probe if self.joined else None
 
     def take(self, wish: Wish) -> None:
         """The next wish, which ends the one before. Raises ProtocolError."""

@@ -15,9 +15,9 @@
 //              otherwise than the host, or ""), device_memory (null on the host), memory_bytes,
 //              memory_budget, nbytes of the compressed volume
 //   histogram  counts of equally wide bins, range, suggested isovalues
-//   picture    wish, step, frame, stage: first, pass, sharp, whole, lossless; format, size, samples,
-//              ambient, shadow, bounce, camera, isovalue, complete, passes, decoded_blocks,
-//              percent, ms, detail; samples: of one whose rays are chosen, before it is finished,
+//   picture    wish, step, frame, stage: first, pass, sharp, whole, lossless; format, size,
+//              samples, ambient, shadow, bounce, camera, isovalue, complete, passes,
+//              decoded_blocks, percent, ms, detail; samples: of one whose rays are chosen, before it is finished,
 //              the most;
 //              rays_cut: of a finished one, how many rays have more hits than are drawn;
 //              field_range: of a finished one, the least and the largest value of the field at the
@@ -49,6 +49,7 @@ const VERSION = 12;
 const MIN_WAIT_MS = 15; // between two wishes
 const MAX_IN_WAIT_MS = 120; // for a picture of the last wish, before the next one is sent
 const MAX_PIXEL_RATIO = 2;
+const RATIO_MS = 1000; // between looks at the density of the screen
 const WORK_MS = 700; // until the page says how far a picture is
 const DARK = "(prefers-color-scheme: dark)";
 
@@ -120,6 +121,7 @@ class View {
   connected() {
     this.shown = this.arrived = { wish: this.shown.wish, frame: -1 };
     this.volume = null;
+    this.tools.waiting.clear();
     this.note("Starting …", "passing");
     this.home.send({ type: "hello", version: VERSION });
   }
@@ -488,12 +490,20 @@ class View {
 
   /** A window that comes to a screen of another density wants other pixels. */
   listenToResolution() {
-    if (this.ended.signal.aborted) return;
-    matchMedia(`(resolution: ${devicePixelRatio}dppx)`).addEventListener("change", () => {
+    const { signal } = this.ended;
+    let ratio = devicePixelRatio;
+    const check = () => {
+      if (devicePixelRatio === ratio) return;
+      ratio = devicePixelRatio;
       this.showState();
       this.push();
-      this.listenToResolution();
-    }, { once: true, signal: this.ended.signal });
+      listen();
+    };
+    const listen = () => matchMedia(`(resolution: ${ratio}dppx)`)
+      .addEventListener("change", check, { once: true, signal });
+    listen();
+    const timer = setInterval(check, RATIO_MS); // not all browsers tell of it each time
+    signal.addEventListener("abort", () => clearInterval(timer));
   }
 
   listenToFields(on) {
