@@ -17,8 +17,8 @@
 //   histogram  counts of equally wide bins, range, suggested isovalues
 //   picture    wish, step, frame, stage: first, pass, sharp, whole, lossless; format, size,
 //              samples, ambient, shadow, bounce, camera, isovalue, complete, passes,
-//              decoded_blocks, percent, ms, detail; samples: of one whose rays are chosen, before it is finished,
-//              the most;
+//              decoded_blocks, percent, ms, detail; samples: of one whose rays are chosen,
+//              before it is finished, the most;
 //              rays_cut: of a finished one, how many rays have more hits than are drawn;
 //              field_range: of a finished one, the least and the largest value of the field at the
 //              hits, or null;
@@ -401,7 +401,7 @@ class View {
     this.narrow = narrow;
   }
 
-  /** What lengths of the world are in; "": nobody says. */
+  /** The unit of the world's lengths; "": it is not known. */
   get unit() {
     return this.state.annotations.units || (this.volume?.anatomical ? "mm" : "");
   }
