@@ -193,6 +193,7 @@ def screenshot(page: Any) -> tuple[str, bytes]:
     if not FIREFOX:
         with page.expect_download() as download:
             button.click()
+        page.keyboard.press("Escape")
         return download.value.suggested_filename, Path(download.value.path()).read_bytes()
     button.click()  # Playwright does not tell of Firefox's downloads
     for _ in range(600):
@@ -218,9 +219,14 @@ def open_scene(page: Any, text: str) -> None:
     )
 
 
+def save_scene(page: Any) -> None:
+    menu(page, "file").get_by_role("button", name="Save scene").click()
+    page.keyboard.press("Escape")
+
+
 def saved_scene(page: Any) -> str:
     with page.expect_download() as saved:
-        menu(page, "file").get_by_role("button", name="Save scene").click()
+        save_scene(page)
     assert saved.value.suggested_filename == "scene.json"
     return Path(saved.value.path()).read_text()
 

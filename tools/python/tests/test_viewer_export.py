@@ -54,17 +54,17 @@ def test_pictures_are_exported_larger_and_clear(page: Any) -> None:
     )
     wish = page.evaluate("document.querySelector('main').dataset.wish")
     for factor in (1, 2, 4):
-        pop.get_by_label(f"{factor}×").check()
+        menu(page, "export").get_by_label(f"{factor}×").check()
         assert f"{factor * width} × {factor * height}" in pop.inner_text()
         picture = exported(page)
         assert picture.size == (factor * width, factor * height) and picture.mode == "RGB"
     keep(page, "export")
-    pop.get_by_label("1×").check()
-    pop.get_by_label("Transparent").check()
+    menu(page, "export").get_by_label("1×").check()
+    menu(page, "export").get_by_label("Transparent").check()
     clear = exported(page)
     alpha = np.asarray(clear)[:, :, 3]
     assert clear.mode == "RGBA" and alpha[2, 2] == 0 and alpha[height // 2, width // 2] == 255
-    pop.get_by_label("Transparent").uncheck()
+    menu(page, "export").get_by_label("Transparent").uncheck()
     plain = np.asarray(exported(page))
     # The page's own picture was not touched.
     assert page.evaluate("document.querySelector('main').dataset.wish") == wish
@@ -81,9 +81,12 @@ def test_an_export_has_a_scale_bar_if_one_likes(open_page: Callable[..., Any]) -
         rests(page)
         pop = menu(page, "export")
         plain = np.asarray(exported(page))
-        pop.get_by_label("With a scale bar").check()
-        assert '"scale_bar":true' in pop.get_by_label("The same picture").input_value()
-        assert '"units":"mm"' in pop.get_by_label("The same picture").input_value()
+        menu(page, "export").get_by_label("With a scale bar").check()
+        assert (
+            '"scale_bar":true'
+            in menu(page, "export").get_by_label("The same picture").input_value()
+        )
+        assert '"units":"mm"' in menu(page, "export").get_by_label("The same picture").input_value()
         with_bar = np.asarray(exported(page))
         assert with_bar.shape == plain.shape and (with_bar != plain).any()
         assert "annotate" not in state(page)
@@ -118,12 +121,13 @@ def test_the_command_says_all_that_the_page_shows(page: Any) -> None:
     page.get_by_label("Paper", exact=True).check()
     page.get_by_label("x from", exact=True).fill("20")
     rests(page)
-    first, scene, end = command(page).split("\n")[:3]
-    words = shlex.split(first)
-    assert words[:3] == ["isowave", "render", "ball.nrrd"] and end == "END"
+    first, scene, end, last, _ = command(page).split("\n")
+    words = shlex.split(last)
+    assert first == "cat > ball_80.json << 'END'" and end == "END"
+    assert words[:5] == ["isowave", "render", "ball.nrrd", "--scene", "ball_80.json"]
     assert words[words.index("--samples") + 1] == "2"
     assert words[words.index("--ambient") + 1] == "16"
-    assert words[-3:] == ["ball_80.png", "<<END"] or words[-2:] == ["ball_80.png", "<<END"]
+    assert words[-2:] == ["-o", "ball_80.png"]
     fields = json.loads(scene)
     assert fields["surfaces"][0]["isovalue"] == 80
     assert fields["clip"] == [{"normal": [1, 0, 0], "offset": pytest.approx(12.6)}]

@@ -159,6 +159,7 @@ def test_the_page_asks_for_an_error_of_the_picture(
         page = open_page()
         page.goto(server.url)
         error, facts = page.get_by_label("Accurate to"), page.locator(".facts")
+        asked(page, volume)
         type_into(error, "2")
         page.keyboard.press("Enter")
         assert asked(page, volume).max_error == 2 and not page.locator(".of_picture").is_visible()

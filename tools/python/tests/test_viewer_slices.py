@@ -17,6 +17,7 @@ from browser_pages import (  # noqa: F401
     keep,
     open_page,
     rests,
+    save_scene,
     screenshot,
     state,
     type_into,
@@ -163,7 +164,7 @@ def test_slices_go_through_scene_files(
             assert request.slices == (Slice(Z, 12, 0.5, False), Slice(Y))
             assert request.slice_map == colors
             with page.expect_download() as saved:
-                button(page, "Save scene").click()
+                save_scene(page)
             saved.value.save_as(file)
             button(page, "Remove slice 2").click()
         fields = isowave._core.parse_scene(file.read_text())

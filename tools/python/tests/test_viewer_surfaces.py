@@ -64,10 +64,11 @@ def test_surfaces_are_added_changed_and_removed(
         assert volume.frames[-1].request.max_error == 1
         assert page.get_by_label("Time per picture").is_disabled()
         # The slider moves the surface that is selected.
-        slider = page.get_by_label("Isovalue on the histogram")
+        slider = page.get_by_label("Isovalue of surface 2 on the histogram")
         slider.fill("150")
         assert asked(page, volume) == [(80, 0.4), (150, 0.5)]
         field(page, "Colour", 1).focus()
+        slider = page.get_by_label("Isovalue of surface 1 on the histogram")
         assert slider.input_value() == "80" and isovalue(page).input_value() == "80"
         type_into(field(page, "Isovalue", 1), "60")
         assert slider.input_value() == "60"

@@ -9,7 +9,7 @@ from viewer_fakes import FakeVolume
 from isowave._request import Request
 from isowave.viewer.protocol import Ack, Wish
 from isowave.viewer.scene import Scene
-from isowave.viewer.turns import DRAWN, Client
+from isowave.viewer.turns import DRAWN, Client, Stage
 
 
 class Clock:
@@ -77,7 +77,7 @@ def run(scene: Scene) -> None:
     """Until nothing is to be done but for clients at rest."""
     for _ in range(1000):
         if not scene.step():
-            due = [c.due for c in scene._turns.clients if c.stage in DRAWN]
+            due = [c.due for c in scene._turns.clients if c.stage in (Stage.SHARP, Stage.WHOLE)]
             if not due:
                 return
             clock = scene._clock

@@ -75,7 +75,8 @@ class Export {
     const volume = (view.volume?.title || "isowave").replace(/(\.(nii|raw|tar))?\.\w+$/, "");
     const step = view.time.names.length > 1 ? `_step${view.time.shown}` : "";
     const what = drawsLabels(view.state) ? "labels" : toText(view.surface.isovalue);
-    return `${volume.replaceAll(/[^\p{L}\p{N}._-]+/gu, "_")}_${what}${step}.png`;
+    const word = volume.replaceAll(/[^\p{L}\p{N}.-]+/gu, "_").replaceAll(/^[_-]+|_+$/g, "");
+    return `${word}_${what}${step}.png`;
   }
 
   /** The command that draws the same picture. */
@@ -97,8 +98,9 @@ class Export {
       ...(error && by === "sample" ? ["--by", "sample"] : []),
       "-o", shellWord(this.name),
     ];
-    return `isowave render ${shellWord(file)} --scene /dev/stdin ${options.join(" ")} <<'END'\n${
-      JSON.stringify(scene)}\nEND\n`;
+    const name = shellWord(this.name.replace(/png$/, "json"));
+    return `cat > ${name} << 'END'\n${JSON.stringify(scene)}\nEND\n`
+      + `isowave render ${shellWord(file)} --scene ${name} ${options.join(" ")}\n`;
   }
 
   /** Size and command, as they are now. */

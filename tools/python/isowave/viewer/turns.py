@@ -75,7 +75,7 @@ class Client:
     is_answered: bool = False  # by a thread
 
     def asks(self, probe: Probe) -> bool:
-        """Keeps a probe, in place of one that waits. Returns whether nobody answers them yet."""
+        """Keeps a probe, in place of one that waits. Returns whether none is being answered."""
         is_first, self.probe, self.is_answered = not self.is_answered, probe, True
         return is_first
 
