@@ -151,7 +151,7 @@ def test_other_drags_move_the_surface(page: Any) -> None:
 def test_the_wheel_zooms_to_the_cursor_and_reset_goes_back(page: Any) -> None:
     home, picture = eye(page), page.evaluate(DRAWN)
     box = page.locator(".picture").bounding_box()
-    x, y = box["x"] + box["width"] * 0.6, box["y"] + box["height"] * 0.4
+    x, y = round(box["x"] + box["width"] * 0.6), round(box["y"] + box["height"] * 0.4)
 
     def wheel() -> None:
         page.mouse.move(x, y)
@@ -164,8 +164,9 @@ def test_the_wheel_zooms_to_the_cursor_and_reset_goes_back(page: Any) -> None:
     seen = []
     for place in (home, eye(page)):
         away = place[2] - 31.5
-        high = (x - box["x"] - box["width"] / 2) / box["height"], 0.1
-        seen.append(place[:2] + 2 * half * away * np.array(high))
+        right = x - box["x"] - box["width"] / 2
+        above = box["y"] + box["height"] / 2 - y
+        seen.append(place[:2] + 2 * half * away * np.array((right, above)) / box["height"])
     assert seen[0] == pytest.approx(seen[1], abs=1e-3)
     assert changes(page, lambda: button(page, "Reset view").click())
     assert page.evaluate(DRAWN) == picture

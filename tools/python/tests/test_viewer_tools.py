@@ -157,7 +157,7 @@ def test_planes_come_by_clicks_and_have_handles(page: Any) -> None:
     assert -offset == pytest.approx(31.5 + 32 * (1 - 80 / 255), abs=1)
     assert len(handles(page)) == 8
     # The arrow turns the plane about its middle.
-    row = page.get_by_label("Position of plane 1")
+    row = page.get_by_label("Offset of plane 1")
     page.keyboard.press("Escape")
     button(page, "Turn round plane 1").click()
     rests(page)
