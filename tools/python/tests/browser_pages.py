@@ -33,6 +33,7 @@ if not PROGRAM:
     pytest.skip(f"no browser: apt-get install {package}", allow_module_level=True)
 
 WIDTH, HEIGHT = 1000, 640
+ROOT = "document.querySelector('main').shadowRoot"
 DOWNLOADS = tempfile.TemporaryDirectory(prefix="isowave_downloads_")
 # Tells which pictures were shown, from the beginning.
 WATCH = """
@@ -109,7 +110,7 @@ def open_page(browser: Any) -> Iterator[Callable[..., Any]]:
 
 
 def rests(page: Any) -> None:
-    """Waits until what was done is a wish, and its lossless picture is shown."""
+    """Waits until what was done is a wish, and its lossless picture is shown; unfolds all rows."""
     # Some events, such as those of another size or hash, come with the next frame of the page.
     page.evaluate(
         """() => new Promise((done) => {
@@ -122,13 +123,22 @@ def rests(page: Any) -> None:
         return pending === undefined && wish === shown && stage === "lossless";
     }"""
     )
+    page.evaluate(f"for (const row of {ROOT}.querySelectorAll('details')) row.open = true")
+
+
+def menu(page: Any, name: str) -> Any:
+    """Opens a menu of the top bar: file, camera, export, info or help."""
+    button = page.locator(f"[name={name}_menu]")
+    if button.get_attribute("aria-expanded") == "false":
+        button.click()
+    return page.locator(f"#{name}_pop")
 
 
 def asked(page: Any, volume: FakeVolume) -> Any:
     """The request of the last picture."""
     rests(page)
     drawn = (frame.request for frame in reversed(volume.frames))
-    return next(request for request in drawn if request.outputs == ("rgb",))  # not of bounds
+    return next(request for request in drawn if "rgb" in request.outputs)  # not of bounds
 
 
 def button(page: Any, name: str) -> Any:
@@ -179,10 +189,11 @@ def double_click(page: Any, x: float, y: float) -> None:
 
 def screenshot(page: Any) -> tuple[str, bytes]:
     """Name and bytes of the file that the button of that name gives."""
-    button = page.get_by_role("button", name="Screenshot")
+    button = menu(page, "export").get_by_role("button", name="Save PNG")
     if not FIREFOX:
         with page.expect_download() as download:
             button.click()
+        page.keyboard.press("Escape")
         return download.value.suggested_filename, Path(download.value.path()).read_bytes()
     button.click()  # Playwright does not tell of Firefox's downloads
     for _ in range(600):
@@ -208,9 +219,14 @@ def open_scene(page: Any, text: str) -> None:
     )
 
 
+def save_scene(page: Any) -> None:
+    menu(page, "file").get_by_role("button", name="Save scene").click()
+    page.keyboard.press("Escape")
+
+
 def saved_scene(page: Any) -> str:
     with page.expect_download() as saved:
-        page.get_by_role("button", name="Save scene").click()
+        save_scene(page)
     assert saved.value.suggested_filename == "scene.json"
     return Path(saved.value.path()).read_text()
 

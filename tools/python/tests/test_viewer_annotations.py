@@ -297,7 +297,7 @@ def test_the_page_asks_for_them(open_page: Callable[..., Any]) -> None:  # noqa:
         page.get_by_label("Axes").check()
         assert wished() == Annotations(("axes",), "", "")
         page.get_by_label("Caption").check()
-        page.get_by_label("Scale bar").check()
+        page.get_by_label("Scale bar", exact=True).check()
         assert wished().what == ("scale-bar", "axes", "caption")
         bar = page.get_by_label("Colour bar")
         assert bar.is_disabled(), "there are no colours that it explains"

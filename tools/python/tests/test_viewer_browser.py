@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import struct
 import threading
 from collections.abc import Callable
@@ -22,13 +23,14 @@ from browser_pages import (
     FIREFOX,
     answer_from_files,
     browser,
+    button,
     changes,
-    double_click,
     drag,
     eye,
     fake_scene,
     isovalue,
     keep,
+    menu,
     open_page,
     page,
     rests,
@@ -51,8 +53,8 @@ def test_a_files_name_is_text_in_the_page(open_page: Callable[..., Any]) -> None
         page = open_page()
         page.goto(server.url)
         rests(page)
-        assert page.locator("h1").inner_text() == name
-        assert page.locator("h1 *").count() == 0 and not page.problems
+        assert page.locator(".title").inner_text() == name
+        assert page.locator(".title *").count() == 0 and not page.problems
 
 
 def test_a_picture_with_fewer_rays_than_asked_for_says_so(open_page: Callable[..., Any]) -> None:
@@ -104,7 +106,7 @@ def test_the_page_loads_without_errors_or_foreign_requests(
 
 def test_the_picture_is_the_renderers(page: Any, server: Server) -> None:
     name, data = screenshot(page)
-    assert name == "isowave_80.png"
+    assert name == "ball_80.png"
     shot = Image.open(io.BytesIO(data))
     assert shot.format == "PNG"
     volume = FakeVolume()
@@ -146,16 +148,27 @@ def test_other_drags_move_the_surface(page: Any) -> None:
     assert eye(page) == pytest.approx(before, abs=1e-5)
 
 
-def test_the_wheel_zooms_and_a_double_click_resets(page: Any) -> None:
+def test_the_wheel_zooms_to_the_cursor_and_reset_goes_back(page: Any) -> None:
     home, picture = eye(page), page.evaluate(DRAWN)
+    box = page.locator(".picture").bounding_box()
+    x, y = round(box["x"] + box["width"] * 0.6), round(box["y"] + box["height"] * 0.4)
 
     def wheel() -> None:
-        page.mouse.move(300, 300)
+        page.mouse.move(x, y)
         page.mouse.wheel(0, -300)
 
     assert changes(page, wheel)
     assert abs(eye(page)[2] - 31.5) < abs(home[2] - 31.5)
-    assert changes(page, lambda: double_click(page, 300, 300))
+    # What was under the cursor, as deep as the middle, still is.
+    half = math.tan(math.radians(30))
+    seen = []
+    for place in (home, eye(page)):
+        away = place[2] - 31.5
+        right = x - box["x"] - box["width"] / 2
+        above = box["y"] + box["height"] / 2 - y
+        seen.append(place[:2] + 2 * half * away * np.array((right, above)) / box["height"])
+    assert seen[0] == pytest.approx(seen[1], abs=1e-3)
+    assert changes(page, lambda: button(page, "Reset view").click())
     assert page.evaluate(DRAWN) == picture
     assert eye(page) == pytest.approx(home)
 
@@ -163,10 +176,13 @@ def test_the_wheel_zooms_and_a_double_click_resets(page: Any) -> None:
 def test_keys_do_all_that_the_mouse_does(page: Any) -> None:
     home, picture = eye(page), page.evaluate(DRAWN)
     page.get_by_role("application").focus()
-    for keys in ("ArrowLeft", "ArrowUp", "Shift+ArrowRight", "+", "-", "+"):
+    for keys in ("ArrowLeft", "ArrowUp", "Shift+ArrowRight", "+", "-", "+", "q", "e", "e"):
         assert changes(page, lambda: page.keyboard.press(keys)), keys
-    assert changes(page, lambda: page.keyboard.press("0"))
-    assert page.evaluate(DRAWN) == picture and eye(page) == pytest.approx(home)
+    for key in ("0", "r"):
+        assert changes(page, lambda: page.keyboard.press(key))
+        assert page.evaluate(DRAWN) == picture and eye(page) == pytest.approx(home)
+        assert changes(page, lambda: page.keyboard.press("3"))
+    assert changes(page, lambda: page.keyboard.press("R"))
     assert not changes(page, lambda: page.keyboard.press("x"))
 
 
@@ -178,10 +194,12 @@ def test_the_focus_goes_through_everything_in_order_and_is_seen(page: Any) -> No
         if (!e) return null;
         const style = getComputedStyle(e);
         const named = e.ariaLabel || e.labels?.[0]?.innerText || e.innerText || e.title;
-        return { name: e.name || e.className || e.localName, label: Boolean(named?.trim()),
+        const tick = e.dataset.value ? "tick" : "";
+        const name = e.name || tick || e.dataset.side || e.className || e.localName;
+        return { name, label: Boolean(named?.trim()),
           visible: style.outlineStyle !== "none" && parseFloat(style.outlineWidth) >= 2 };
     }"""
-    for _ in range(50):
+    for _ in range(80):
         page.keyboard.press("Tab")
         at = page.evaluate(focused)
         if at is None:
@@ -190,11 +208,15 @@ def test_the_focus_goes_through_everything_in_order_and_is_seen(page: Any) -> No
         seen.append(at["name"])
     if FIREFOX:  # whose keys scroll it from there
         seen.remove("panel")
-    expected = "picture toggle isovalue slider reset shot copy paste save_scene open_scene"
-    expected += " color value opacity add add_labels light color_map background gradient"
+    expected = "file_menu share camera_menu export_menu info_menu help_menu toggle picture"
+    expected += "".join(f" tool_{t}" for t in "orbit pan measure clip slice pivot".split())
+    expected += " reset front isovalue slider log zoom_in zoom_all zoom_out"
+    expected = expected.replace("isovalue slider", "isovalue tick tick slider")
+    expected += " color value opacity add peak add_labels"
     expected += "".join(f" clip_{axis}_from clip_{axis}_to" for axis in "xyz")
-    expected += " caps slice_x slice_y slice_z scale-bar axes caption units title"
-    expected += " max_error by samples ambient time_budget budget summary"
+    expected += " add_plane caps slice_x slice_y slice_z colour_by color_map preset background"
+    expected += " summary light gradient summary scale-bar axes caption units title"
+    expected += " summary max_error by samples ambient time_budget budget"
     assert seen == expected.split()
 
 
@@ -228,10 +250,10 @@ def test_colours_and_quality(page: Any) -> None:
     keep(page, "colours")
 
     def quality() -> None:
-        type_into(page.get_by_label("Largest error"), "0.5")
+        type_into(page.get_by_label("Accurate to"), "0.5")
         page.keyboard.press("Enter")
-        page.get_by_label("Samples per pixel").select_option("4")
-        page.get_by_label("Ambient rays").select_option("8")
+        page.get_by_label("Rays per pixel").select_option("4")
+        page.get_by_label("Soft shade").select_option("8")
 
     quality()
     rests(page)
@@ -240,11 +262,11 @@ def test_colours_and_quality(page: Any) -> None:
     assert "4 rays a pixel" in page.locator(".facts").inner_text()
     assert "within 0.5 px" in page.locator(".facts").inner_text()
     # A frame keeps an error or a time; what was given last counts.
-    type_into(page.get_by_label("Time budget"), "200")
+    type_into(page.get_by_label("Time per picture"), "200")
     page.keyboard.press("Enter")
     rests(page)
     assert state(page)["ms"] == "200" and "error" not in state(page)
-    assert page.get_by_label("Largest error").input_value() == ""
+    assert page.get_by_label("Accurate to").input_value() == ""
 
 
 def test_three_clients_keep_their_isovalues(open_page: Callable[..., Any], server: Server) -> None:
@@ -346,58 +368,8 @@ def test_the_url_restores_the_state(
     assert state(page)["iso"] == "33" and page.problems == []
 
 
-def test_cameras_are_copied_and_pasted(page: Any) -> None:
-    if not FIREFOX:
-        page.context.grant_permissions(["clipboard-read", "clipboard-write"])
-    picture = page.evaluate(DRAWN)
-    page.get_by_role("button", name="Copy camera").click()
-    page.get_by_text("Copied").first.wait_for()
-    text = page.evaluate("navigator.clipboard.readText()")
-    file = json.loads(text)
-    assert file["fovy_deg"] == 60 and set(file["cameras"][0]) == {"eye", "at", "up"}
-    assert [file["width"], file["height"]] == picture[:2]
-    assert changes(page, lambda: drag(page, 100, 0))
-    page.get_by_role("button", name="Paste camera").click()
-    page.get_by_label("Camera file (JSON)").fill(text)
-    assert changes(page, lambda: page.get_by_role("button", name="Use it").click())
-    assert page.evaluate(DRAWN) == picture
-    assert not page.get_by_label("Camera file (JSON)").is_visible()
-
-
-@pytest.mark.parametrize(
-    "text, message",
-    [
-        ("", "This is no camera: it must be JSON"),
-        ("{}", '"cameras" with "eye", "at" and "up" is missing'),
-        ('{"cameras": [{"eye": [0, 0], "at": [0, 0, 0]}]}', '"eye" must be three numbers'),
-        ('{"cameras": [{"eye": [1, 2, 3], "at": [1, 2, 3]}]}', "are the same point"),
-        ('{"cameras": [{"eye": [0, 5, 0], "at": [0, 0, 0]}]}', "parallel to the view"),
-        (
-            '{"fovy_deg": 200, "cameras": [{"eye": [0, 0, 5], "at": [0, 0, 0]}]}',
-            "between 0 and 180",
-        ),
-        (
-            '{"fovy_deg": "x", "cameras": [{"eye": [0, 0, 5], "at": [0, 0, 0]}]}',
-            "between 0 and 180",
-        ),
-        ('{"cameras": [{"eye": [1e30, 0, 5], "at": [0, 0, 0]}]}', "too large"),
-        ("[" * 3000, "This is no camera"),
-    ],
-)
-def test_a_bad_camera_gets_a_readable_message(page: Any, text: str, message: str) -> None:
-    page.get_by_role("button", name="Paste camera").click()
-    page.get_by_label("Camera file (JSON)").fill(text)
-    page.get_by_role("button", name="Use it").click()
-    assert message in page.locator(".problem").inner_text()
-    if "same point" in message:
-        keep(page, "bad_camera")
-    page.keyboard.press("Escape")
-    assert not page.get_by_label("Camera file (JSON)").is_visible()
-    assert page.problems == []
-
-
 def test_a_memory_budget_is_shown_and_set(page: Any, server: Server) -> None:
-    field = page.get_by_label("Memory budget")
+    field = page.get_by_label("Device memory")
     assert (
         field.input_value() == "" and "95 MiB of 1,024 MiB" in page.locator(".device").inner_text()
     )
@@ -423,10 +395,9 @@ def test_a_narrow_window_shows_everything(open_page: Callable[..., Any], server:
     rests(page)
     assert page.evaluate(f"{frame}.scrollWidth <= 320 && document.body.scrollWidth <= 320")
     keep(page, "narrow_panel")
-    for name in ("Reset view", "Paste camera"):
-        button = page.get_by_role("button", name=name)
-        button.scroll_into_view_if_needed()
-        box = button.bounding_box()
+    for name in ("Reset view", "Add plane"):
+        button(page, name).scroll_into_view_if_needed()
+        box = button(page, name).bounding_box()
         assert box["x"] >= 0 and box["x"] + box["width"] <= 320
     # On a display of twice the density the picture has twice the pixels. Firefox's has a scrollbar
     # beside it.
@@ -472,9 +443,11 @@ def test_text_has_contrast(open_page: Callable[..., Any], server: Server, scheme
     page = open_page(color_scheme=scheme, reduced_motion="reduce")
     page.goto(server.url)
     rests(page)
-    page.get_by_text("Keys and gestures").click()
     keep(page, scheme)
     ratios = page.evaluate(CONTRAST)
+    for name in ("file", "camera", "export", "info", "help"):
+        menu(page, name)
+        ratios += page.evaluate(CONTRAST)
     assert len(ratios) > 25
     assert [(name, ratio) for name, ratio in ratios if ratio < 4.5] == []
     moving = "getComputedStyle(document.querySelector('main').shadowRoot.querySelector('.bar'))"
@@ -520,7 +493,7 @@ def test_nothing_that_is_done_in_the_page_is_malformed(page: Any) -> None:
             new KeyboardEvent("keydown", { key: "ArrowUp", bubbles: true }));
     }"""
     )
-    for name in ("Isovalue", "Largest error", "Time budget", "Memory budget"):
+    for name in ("Isovalue", "Accurate to", "Time per picture", "Device memory"):
         for value in ("1e300", "-1e300", "1e-300"):
             type_into(page.get_by_label(name, exact=name == "Isovalue").last, value)
             page.keyboard.press("Enter")
@@ -564,7 +537,7 @@ def test_a_budget_that_is_too_small_says_what_would_do(open_page: Callable[..., 
         page = open_page()
         page.goto(server.url)
         rests(page)
-        type_into(page.get_by_label("Memory budget"), "1")
+        type_into(page.get_by_label("Device memory"), "1")
         page.keyboard.press("Enter")
         page.get_by_text("needs 20 MiB").wait_for()
         page.wait_for_function("() => document.querySelector('main').dataset.state === 'ready'")

@@ -19,6 +19,7 @@ from browser_pages import (  # noqa: F401
     keep,
     open_page,
     rests,
+    save_scene,
     screenshot,
     state,
     type_into,
@@ -84,7 +85,7 @@ def test_labels_come_in_place_of_surfaces(open_page: Callable[..., Any]) -> None
             of_group(page, "Labels of", 1).fill(bad)
             assert of_group(page, "Labels of", 1).evaluate("e => e.matches(':invalid')"), bad
         assert groups(page, volume) == [((3, 4, 5, 9), 0.4), ((10,), 1)]
-        assert screenshot(page)[0] == "isowave_labels.png"
+        assert screenshot(page)[0] == "ball_labels.png"
         page.reload()
         assert groups(page, volume) == [((3, 4, 5, 9), 0.4), ((10,), 1)]
         assert of_group(page, "Labels of", 1).input_value() == "3-5, 9"
@@ -163,7 +164,7 @@ def test_labels_go_through_scene_files(
             page.locator(".groups li").nth(1).wait_for()
             assert groups(page, volume) == [((3, 7), 0.5), ((65535,), 1)]
             with page.expect_download() as saved:
-                button(page, "Save scene").click()
+                save_scene(page)
             saved.value.save_as(file)
             button(page, "Remove group 2").click()
         fields = isowave._core.parse_scene(file.read_text())
@@ -341,7 +342,7 @@ def test_colours_by_label_are_a_choice(open_page: Callable[..., Any]) -> None:  
         assert asked(page, volume).color_map == color_map_of(ColorMap("viridis", "x"))
         by.select_option("labels")
         with page.expect_download() as saved:
-            button(page, "Save scene").click()
+            save_scene(page)
         text = Path(saved.value.path()).read_text()
         fields = isowave._core.parse_scene(text)
         assert fields["color_by_label"] and str(fields["field"]) == "volume"
@@ -376,7 +377,7 @@ def test_isosurfaces_have_colours_by_a_second_volumes_labels(
         request = asked(page, volume)
         assert request.isovalue == 90 and request.color_map == color_map_of(BY_LABEL)
         with page.expect_download() as saved:
-            button(page, "Save scene").click()
+            save_scene(page)
         fields = isowave._core.parse_scene(Path(saved.value.path()).read_text())
         assert fields["color_by_label"] and str(fields["field"]) == "atlas.nrrd"
         assert not page.problems

@@ -19,13 +19,14 @@ def test_an_encoding_stops_when_its_picture_is_not_wanted_any_more() -> None:
         encode_png(rgb, lambda: next(asked))
 
 
-def test_an_extent_shrinks_by_its_pixels_first() -> None:
+def test_an_extent_has_fewer_rays_a_pixel_then_fewer_pixels_then_less_light() -> None:
     extent = Extent((100, 50), 2, 9)
     assert (extent.rays, extent.all_rays) == (20_000, 200_000)
     assert extent.within(20_000, 200_000) == extent
-    assert extent.within(5_000, 200_000) == Extent((50, 25), 2, 9)
+    assert extent.within(19_999, 200_000) == Extent((100, 50), 1, 9)
+    assert extent.within(1_250, 200_000) == Extent((50, 25), 1, 9)
     assert extent.within(20_000, 100_000) == Extent((100, 50), 2, 4)
-    assert extent.within(20_000, 5_000) == Extent((50, 25), 2, 0)
+    assert extent.within(20_000, 5_000) == Extent((100, 50), 1, 0)
 
 
 def test_rays_that_are_chosen_become_fewer_before_pixels_and_light() -> None:

@@ -20,6 +20,7 @@ from isowave.viewer.protocol import (
     Ack,
     Budget,
     Hello,
+    Probe,
     ProtocolError,
     SceneFile,
     Wish,
@@ -418,3 +419,18 @@ def test_fuzz() -> None:
     while scene.step():
         other.receive({"type": "ack", "frame": sum(h["type"] == "picture" for h in sent)})
     assert "whole" in [h["stage"] for h in sent if h["type"] == "picture"]
+
+
+def test_probes_are_places_of_a_picture() -> None:
+    assert check({"type": "probe", "id": 3, "at": [0, 0.25]}) == Probe(3, (0.0, 0.25))
+    for at in ([0], [0, 1.01], [-0.1, 0], "ab", [0, "1"], [0, None], [True, 0], None):
+        with pytest.raises(ProtocolError):
+            check({"type": "probe", "id": 3, "at": at})
+
+
+def test_transparent_pictures_have_no_background() -> None:
+    wish = check({**PLAIN_WISH, "transparent": True, "background_top": [1, 0, 0]})
+    assert isinstance(wish, Wish) and wish.request.transparent
+    assert wish.request.background is None and wish.request.background_top is None
+    with pytest.raises(ProtocolError):
+        check({**PLAIN_WISH, "transparent": 1})

@@ -158,12 +158,13 @@ def test_the_page_asks_for_an_error_of_the_picture(
     with Server(fake_scene(volume)) as server:
         page = open_page()
         page.goto(server.url)
-        error, facts = page.get_by_label("Largest error"), page.locator(".facts")
+        error, facts = page.get_by_label("Accurate to"), page.locator(".facts")
+        asked(page, volume)
         type_into(error, "2")
         page.keyboard.press("Enter")
         assert asked(page, volume).max_error == 2 and not page.locator(".of_picture").is_visible()
         # Pixels are no FLIP: the number goes, and the limits are others.
-        page.get_by_label("Error judged by").select_option("picture")
+        page.get_by_label("Judged by").select_option("picture")
         request = asked(page, volume)
         assert (request.max_error, request.max_image_error, request.samples) == (None, None, 1)
         assert error.input_value() == "" and page.locator(".of_error").inner_text() == "FLIP"
@@ -178,12 +179,12 @@ def test_the_page_asks_for_an_error_of_the_picture(
         page.keyboard.press("Enter")
         request = asked(page, volume)
         assert (request.max_error, request.max_image_error, request.samples) == (None, 0.01, 4)
-        assert page.get_by_label("Most samples per pixel").input_value() == "4"
+        assert page.get_by_label("Most rays per pixel").input_value() == "4"
         assert "4 rays a pixel" in facts.inner_text()
         assert "FLIP 0.008, at most 0.01 with 95 % confidence" in facts.inner_text()
         assert state(page)["error"] == "0.01" and state(page)["by"] == "picture"
         keep(page, "picture_error")
-        page.get_by_label("Most samples per pixel").select_option("4")
+        page.get_by_label("Most rays per pixel").select_option("4")
         assert asked(page, volume).samples == 2
         type_into(error, "0.002")
         page.keyboard.press("Enter")
@@ -201,7 +202,7 @@ def test_the_page_asks_for_an_error_of_the_picture(
         button(page, "Remove surface 2").click()
         assert asked(page, volume).max_image_error == 0.002
         # What was given last counts.
-        type_into(page.get_by_label("Time budget"), "200")
+        type_into(page.get_by_label("Time per picture"), "200")
         page.keyboard.press("Enter")
         request = asked(page, volume)
         assert (request.max_image_error, request.time_budget) == (None, 0.2)

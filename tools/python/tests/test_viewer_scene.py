@@ -465,7 +465,7 @@ def test_the_device_overtakes_the_host() -> None:
     scene.receive(client, wish_of(1, time_budget=1.0))  # within a time: without a first picture
     assert done.wait(60)
     assert [f.stopped for f in by_host.frames] == [True]
-    assert [f.stopped for f in volume.frames if f.request.outputs == ("rgb",)] == [False]
+    assert [f.stopped for f in volume.frames if "rgb" in f.request.outputs] == [False]
     scene.close()
 
 

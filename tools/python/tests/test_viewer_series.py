@@ -341,7 +341,7 @@ def test_a_slider_shows_the_steps(open_page: Callable[..., Any]) -> None:  # noq
         page.get_by_label("Isovalue", exact=True).last.fill("100")
         rests(page)
         assert state(page)["step"] == "7" and balls.drawn[-1] == 7
-        assert screenshot(page)[0] == "isowave_100_step7.png"
+        assert screenshot(page)[0] == "step_100_step7.png"
         keep(page, "series")
         assert other.locator(".steps output").inner_text() == "step 0: step_0.nrrd"
         # The address keeps the step; one that there is not is the last.

@@ -17,6 +17,7 @@ from browser_pages import (  # noqa: F401
     keep,
     open_page,
     rests,
+    save_scene,
     screenshot,
     state,
     type_into,
@@ -48,15 +49,14 @@ def test_slices_are_added_moved_and_removed(open_page: Callable[..., Any]) -> No
         page = open_page()
         page.goto(server.url)
         assert asked(page, volume).slices == () and not page.locator(".slice_look").is_visible()
-        type_into(page.get_by_label("Largest error"), "1")
+        type_into(page.get_by_label("Accurate to"), "1")
         page.keyboard.press("Enter")
         assert asked(page, volume).max_error == 1
         button(page, "Add z").click()
         request = asked(page, volume)
-        assert request.slices == (Slice(Z, MIDDLE),) and request.max_error is None
+        assert request.slices == (Slice(Z, MIDDLE),) and request.max_error == 1
         assert request.slice_map == slice_map_of("gray") and request.surfaces == ()
-        for name in ("max_error", "by", "time_budget"):
-            assert page.locator(f"[name={name}]").is_disabled(), "not with slices"
+        assert page.get_by_label("Time per picture").is_disabled(), "not with slices"
         button(page, "Add x").click()
         of_slice(page, "Position of", 2).fill(str(SIDE - 1))
         of_slice(page, "Opacity of", 2).fill("0.4")
@@ -87,7 +87,7 @@ def test_slices_are_added_moved_and_removed(open_page: Callable[..., Any]) -> No
         assert asked(page, volume).slices == moved[1:]
         button(page, "Remove slice 1").click()
         assert asked(page, volume).max_error == 1 and "slices" not in state(page)
-        assert page.get_by_label("Largest error").is_enabled() and not page.problems
+        assert page.get_by_label("Accurate to").is_enabled() and not page.problems
 
 
 def test_addresses_of_slices(open_page: Callable[..., Any]) -> None:  # noqa: F811
@@ -163,7 +163,7 @@ def test_slices_go_through_scene_files(
             assert request.slices == (Slice(Z, 12, 0.5, False), Slice(Y))
             assert request.slice_map == colors
             with page.expect_download() as saved:
-                button(page, "Save scene").click()
+                save_scene(page)
             saved.value.save_as(file)
             button(page, "Remove slice 2").click()
         fields = isowave._core.parse_scene(file.read_text())
@@ -185,14 +185,14 @@ def test_a_renderer_is_made_for_slices() -> None:
     run(scene)
     assert [options["surfaces"] for options in volume.renderers] == [0, 1]
     assert eye.pictures[-1] == (2, "whole") and not eye.of_type("error")
-    # No bounds are looked for.
+    # Bounds are those of first hits.
     eye.ack()
     clock.now += REST_SECONDS
     run(scene)
     eye.ack()
     clock.now += 10
     run(scene)
-    assert eye.pictures[-1] == (2, "lossless") and not eye.of_type("bounds")
+    assert eye.pictures[-1] == (2, "lossless") and [h["wish"] for h in eye.of_type("bounds")] == [2]
     eye.wish(surfaces=[Surface(80, opacity=0.5), Surface(90)], slices=[Slice("z", 9)], color=None)
     run(scene)
     assert [options["surfaces"] for options in volume.renderers] == [0, 1, 2]

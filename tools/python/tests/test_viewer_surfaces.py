@@ -54,7 +54,7 @@ def test_surfaces_are_added_changed_and_removed(
         page = open_page()
         page.goto(server.url)
         assert asked(page, volume) == [] and state(page)["iso"] == "80"
-        type_into(page.get_by_label("Largest error"), "1")
+        type_into(page.get_by_label("Accurate to"), "1")
         assert button(page, "Remove surface 1").is_disabled()
         assert button(page, "Show surface 1").is_disabled()
         # Added at suggested isovalues; the error is then the first hits'.
@@ -62,12 +62,13 @@ def test_surfaces_are_added_changed_and_removed(
         button(page, "Add surface").click()
         assert asked(page, volume) == [(80, 0.4), (90.5, 0.5)]
         assert volume.frames[-1].request.max_error == 1
-        assert page.get_by_label("Time budget").is_disabled()
+        assert page.get_by_label("Time per picture").is_disabled()
         # The slider moves the surface that is selected.
-        slider = page.get_by_label("Isovalue on the histogram")
+        slider = page.get_by_label("Isovalue of surface 2 on the histogram")
         slider.fill("150")
         assert asked(page, volume) == [(80, 0.4), (150, 0.5)]
         field(page, "Colour", 1).focus()
+        slider = page.get_by_label("Isovalue of surface 1 on the histogram")
         assert slider.input_value() == "80" and isovalue(page).input_value() == "80"
         type_into(field(page, "Isovalue", 1), "60")
         assert slider.input_value() == "60"
@@ -89,7 +90,7 @@ def test_surfaces_are_added_changed_and_removed(
             "150",
             "1",
         )
-        assert not page.get_by_label("Time budget").is_disabled()
+        assert not page.get_by_label("Time per picture").is_disabled()
         assert not page.problems
 
 

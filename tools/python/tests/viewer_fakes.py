@@ -50,6 +50,7 @@ PLAIN_WISH: dict[str, Any] = {
     "light": None,
     "shadow": None,
     "bounce": 0,
+    "transparent": False,
 }
 
 
@@ -65,6 +66,7 @@ class FakeImage:
     rgb: NDArray[np.uint8]
     statistics: Mapping[str, Any]
     complete: bool
+    rgba: NDArray[np.uint8] = field(default_factory=lambda: np.zeros((1, 1, 4), np.uint8))
     depth: NDArray[np.float32] | None = None
     bounds: NDArray[np.float32] | None = None
 
@@ -98,6 +100,8 @@ class FakeVolume:
     renderers: list[dict[str, Any]] = field(default_factory=list)
     shape: tuple[int, int, int] = (SIDE, SIDE, SIDE)
     spacing: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    direction: NDArray[np.float64] = field(default_factory=lambda: np.eye(3))
     anatomical: bool = False
     box: tuple[Vector, Vector] = ((0.0, 0.0, 0.0), (SIDE - 1.0, SIDE - 1.0, SIDE - 1.0))
     source_dtype: np.dtype[Any] = field(default_factory=lambda: np.dtype(np.uint8))
@@ -109,6 +113,15 @@ class FakeVolume:
     on_host: bool = False
     suggested: tuple[float, ...] = (90.5, 180.5)
     fail_suggesting: bool = False
+    refuse_voxels: bool = False
+
+    def __getitem__(self, key: Any) -> NDArray[np.float32]:
+        """Voxels: VALUES at the centre, less outwards."""
+        if self.refuse_voxels:
+            raise RuntimeError("the file is gone")
+        z, y, x = (np.arange(SIDE)[part] - (SIDE - 1) / 2 for part in key)
+        away = np.sqrt(z[:, None, None] ** 2 + y[:, None] ** 2 + x**2)
+        return (VALUES * (1 - away / (SIDE / 2))).astype(np.float32)
 
     def isovalue_notice(self, isovalue: float) -> str:
         least, largest = self.value_range
@@ -197,7 +210,7 @@ class FakeRenderer:
             self._volume.before_pass(drawn)
             drawn.passes += 1
             image = picture.copy()
-            image[rows * (i + 1) // self._volume.passes :] = _bytes(request.background)
+            image[rows * (i + 1) // self._volume.passes :] = _bytes(request.background or (1, 1, 1))
             statistics = {
                 "passes": i + 1,
                 "decoded_blocks": 0 if cached else 100 * (i + 1),
@@ -214,7 +227,13 @@ class FakeRenderer:
         part = np.arange(columns * rows, dtype=np.float32).reshape(rows, columns) % 4
         depth = np.where(part == 0, np.inf, 5).astype(np.float32)
         bounds = np.choose(part.astype(int), [0, 0.2, 0.2, np.inf]).astype(np.float32)
-        return FakeImage(image, statistics, True, depth, bounds)
+        alpha = np.full((rows, columns, 1), 255, np.uint8)
+        if "rgb" in request.outputs:
+            depth = self._rays(request)[2]
+            alpha = np.where(np.isfinite(depth), 255, 0).astype(np.uint8)[:, :, None]
+            if "depth" not in request.outputs:
+                return FakeImage(image, statistics, True, np.dstack((image, alpha)))
+        return FakeImage(image, statistics, True, np.dstack((image, alpha)), depth, bounds)
 
     def _chosen(self, request: Request) -> dict[str, Any] | None:
         """Rays and levels for an error of the picture: FLIP is FLIP_OF_ONE by n x n rays, by n."""
@@ -239,7 +258,7 @@ class FakeRenderer:
         """The picture of one ball, or of balls one in another."""
         if not request.surfaces:
             return self._picture(request)
-        seen: NDArray[Any] = np.array(_bytes(request.background))
+        seen: NDArray[Any] = np.array(_bytes(request.background or (1, 1, 1)))
         for each in sorted(request.surfaces, key=lambda s: -s.values[0]):
             look: dict[str, Any] = {"color": each.color, "color_map": None}
             ball = replace(request, surfaces=(), isovalue=each.values[0], **look)
@@ -255,6 +274,19 @@ class FakeRenderer:
 
         Each ray has four pixels: numpy would take most of a page's time.
         """
+        rays, normal, depth = self._rays(request)
+        light = 0.2 + 0.8 * np.clip(-np.sum(normal * rays, axis=2), 0, 1)
+        cells = np.floor(normal * 4).astype(int).sum(axis=2) % 2
+        shade = (light * (1 - 0.25 * cells))[:, :, None] * np.array(
+            request.color or (0.5, 0.5, 0.5)
+        )
+        hit, background = np.isfinite(depth)[:, :, None], np.array(request.background or (1, 1, 1))
+        rgb = np.where(hit, _full(shade, request), background)
+        picture: NDArray[np.uint8] = np.round(255 * rgb).astype(np.uint8)
+        return picture
+
+    def _rays(self, request: Request) -> tuple[NDArray[Any], NDArray[Any], NDArray[np.float32]]:
+        """Directions and normals of rays, each of four pixels; depth of all pixels."""
         camera, isovalue = request.camera, request.isovalue
         assert camera is not None and request.size is not None
         columns, rows = request.size
@@ -274,14 +306,15 @@ class FakeRenderer:
         hit = (inside >= 0) & (along > 0)
         t = along - np.sqrt(np.maximum(inside, 0))
         normal = (rays * t[:, :, None] - to) / max(self._radius(isovalue), 1e-9)
-        light = 0.2 + 0.8 * np.clip(-np.sum(normal * rays, axis=2), 0, 1)
-        cells = np.floor(normal * 4).astype(int).sum(axis=2) % 2
-        shade = (light * (1 - 0.25 * cells))[:, :, None] * np.array(
-            request.color or (0.5, 0.5, 0.5)
-        )
-        rgb = np.where(hit[:, :, None], shade, np.array(request.background))
-        pixels = np.round(255 * rgb).astype(np.uint8)
-        return np.repeat(np.repeat(pixels, 2, axis=0), 2, axis=1)[:rows, :columns].copy()
+        depth = np.where(hit, t, np.inf).astype(np.float32)
+        return rays, normal, _full(depth, request)
+
+
+def _full(rays: NDArray[Any], request: Request) -> NDArray[Any]:
+    """What each ray has, for its four pixels."""
+    assert request.size is not None
+    columns, rows = request.size
+    return np.repeat(np.repeat(rays, 2, axis=0), 2, axis=1)[:rows, :columns].copy()
 
 
 def _unit(v: NDArray[Any]) -> NDArray[Any]:

@@ -9,7 +9,7 @@ from viewer_fakes import FakeVolume
 from isowave._request import Request
 from isowave.viewer.protocol import Ack, Wish
 from isowave.viewer.scene import Scene
-from isowave.viewer.turns import Client, Stage
+from isowave.viewer.turns import DRAWN, Client, Stage
 
 
 class Clock:
@@ -50,7 +50,7 @@ class Eye:
 
     def stage_done(self) -> bool:
         """Whether nothing is to be drawn for it before it has rested."""
-        return self.client.stage not in (Stage.FIRST, Stage.WHOLE)
+        return self.client.stage not in DRAWN
 
     def ack(self) -> None:
         """Acknowledges all that came."""
@@ -77,7 +77,7 @@ def run(scene: Scene) -> None:
     """Until nothing is to be done but for clients at rest."""
     for _ in range(1000):
         if not scene.step():
-            due = [c.due for c in scene._turns.clients if c.stage is Stage.WHOLE]
+            due = [c.due for c in scene._turns.clients if c.stage in (Stage.SHARP, Stage.WHOLE)]
             if not due:
                 return
             clock = scene._clock

@@ -2,6 +2,37 @@
 // websocket. A notebook's front end imports it: the default export is a widget of anywidget, which
 // talks through the kernel's channel. The last part of an ES module (front_end.py).
 
+/** A message of the websocket: its head, and a picture's bytes. */
+function unpack(data) {
+  if (typeof data === "string") return [JSON.parse(data)];
+  const size = new DataView(data).getUint32(0, true);
+  const head = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, size)));
+  return [head, new Uint8Array(data, 4 + size)];
+}
+
+/** Another connection to the server. receive: hears of messages. */
+function socketBeside(url, receive) {
+  const socket = new WebSocket(url);
+  const waiting = [];
+  let isOver = false;
+  socket.binaryType = "arraybuffer";
+  socket.onopen = () => waiting.forEach((message) => socket.send(message));
+  socket.onmessage = ({ data }) => !isOver && receive(...unpack(data));
+  socket.onclose = ({ reason }) => !isOver && receive({ type: "closed",
+    message: reason || "The connection is lost." });
+  return {
+    send: (message) => {
+      const text = JSON.stringify(message);
+      if (socket.readyState === WebSocket.OPEN) socket.send(text);
+      else waiting.push(text);
+    },
+    close: () => {
+      isOver = true;
+      socket.close();
+    },
+  };
+}
+
 /**
  * A view that talks to a server, and again when the connection was lost.
  * @param {HTMLElement} host
@@ -15,6 +46,7 @@ export function connect(host, url) {
   };
   const view = new View(host, {
     send, wheel: () => true, hash: true, isDark: () => matchMedia(DARK).matches,
+    beside: (receive) => socketBeside(url, receive),
   });
   const open = () => {
     socket = new WebSocket(url);
@@ -24,12 +56,7 @@ export function connect(host, url) {
       failures = 0;
       view.connected();
     };
-    socket.onmessage = ({ data }) => {
-      if (typeof data === "string") return view.receive(JSON.parse(data));
-      const size = new DataView(data).getUint32(0, true);
-      const head = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, size)));
-      view.receive(head, new Uint8Array(data, 4 + size));
-    };
+    socket.onmessage = ({ data }) => view.receive(...unpack(data));
     socket.onclose = ({ code, reason }) => {
       view.host.dataset.state = "closed";
       const final = code === 1008 || code === 1003 || code === 1009;
@@ -60,10 +87,26 @@ async function showStill(view, data) {
   bitmap.close();
 }
 
+const makeName = () => crypto.getRandomValues(new Uint32Array(4)).join("-"); // of a view
+
+/** Another view of the widget. receive: hears of messages. */
+function viewBeside(model, receive) {
+  const name = makeName();
+  const hear = ({ view, message }, buffers) => view === name && receive(message, buffers?.[0]);
+  model.on("msg:custom", hear);
+  return {
+    send: (message) => model.send({ view: name, message }),
+    close: () => {
+      model.off("msg:custom", hear);
+      model.send({ view: name, message: null });
+    },
+  };
+}
+
 /** A view in a notebook: of anywidget. */
 function render({ model, el }) {
   const host = document.createElement("div");
-  const name = crypto.getRandomValues(new Uint32Array(4)).join("-");
+  const name = makeName();
   let timer = 0; // runs until the kernel answers
   const send = (message) => {
     model.send({ view: name, message });
@@ -78,7 +121,8 @@ function render({ model, el }) {
   const resize = () => { host.style.height = `${model.get("height")}px`; };
   resize();
   el.append(host);
-  const view = new View(host, { send, wheel, hash: false, isDark });
+  const beside = (hear) => viewBeside(model, hear);
+  const view = new View(host, { send, wheel, hash: false, isDark, beside });
   const receive = ({ view: to, message }, buffers) => {
     if (to !== name) return;
     clearTimeout(timer);

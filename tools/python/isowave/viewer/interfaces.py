@@ -26,6 +26,10 @@ class ImageLike(Protocol):
         ...
 
     @property
+    def rgba(self) -> NDArray[np.uint8]:
+        ...
+
+    @property
     def statistics(self) -> Mapping[str, Any]:
         ...
 
@@ -88,6 +92,14 @@ class VolumeLike(Protocol):
         ...
 
     @property
+    def origin(self) -> tuple[float, float, float]:
+        ...
+
+    @property
+    def direction(self) -> NDArray[np.float64]:
+        ...
+
+    @property
     def anatomical(self) -> bool:
         ...
 
@@ -117,6 +129,9 @@ class VolumeLike(Protocol):
 
     @property
     def num_levels(self) -> int:
+        ...
+
+    def __getitem__(self, key: Any) -> Any:
         ...
 
     def isovalue_notice(self, isovalue: float) -> str:

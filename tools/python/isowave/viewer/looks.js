@@ -2,8 +2,8 @@
 // wishes and URLs say of them, and their elements in the panel. A part of an ES module
 // (front_end.py).
 
-/** @typedef {{colors: string, by: "axis" | "field" | "caps" | "labels",
- *    axis: Vec, range: ?[number, number]}} ColorMap as in wishes */
+/** @typedef {{colors: string, by: "axis" | "depth" | "field" | "caps" | "labels",
+ *    axis: Vec, range: ?[number, number]}} ColorMap as in wishes; depth: along the view */
 /** @typedef {{rays: number, angle: number}} Shadow as in wishes: rays of a hit towards the light,
  *    and half of the angle that the light has [degrees] */
 
@@ -11,6 +11,7 @@
 const COLOR_MAPS = ["viridis", "magma", "cividis", "coolwarm", "gray", "labels"];
 const AXES = { x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1] };
 const BY_FIELD = { field: "field", caps: "caps", labels: "labels" }; // ways, as the page names them
+const isWay = (by) => by === "depth" || Object.hasOwn(BY_FIELD, by);
 const LIGHTS = ["ambient", "diffuse", "specular", "above"]; // as the library has them
 const MAX_PLANES = 8; // beside those of the sliders
 const SHADOWS = { 1: "hard", 16: "soft" }; // rays of a hit that one can choose
@@ -26,9 +27,19 @@ const numberField = (name, more) =>
   `<span class="unit"><input name="${name}" type="number" step="any" ${more}></span>`;
 const options = (texts) => Object.entries(texts).map(([value, text]) =>
   `<option value="${value}">${text}</option>`).join("");
+/** HTML of a choice of one, of few. */
+const segments = (name, label, texts) => `<div class="segments" role="radiogroup"
+  aria-label="${label}" data-name="${name}">${Object.entries(texts).map(([value, text]) =>
+  `<label><input type="radio" name="${name}" value="${value}">${text}</label>`).join("")}</div>`;
+/** Shows the choice. null: none of them. */
+const check = (view, name, value) => {
+  for (const radio of view.root.querySelectorAll(`[name=${name}]`)) {
+    radio.checked = radio.value === value;
+  }
+};
 const choices = (names) => names.map((name) => `<option>${name}</option>`).join("");
-/** HTML of the choice of colours and light. */
-const LOOK_ROWS = `
+/** HTML of the choice of light and background. */
+const LIGHT_ROWS = `
     <label title="Whether the light above turns with the view, or stays where it is now">Light
       <select name="light"><option value="">turns</option><option value="stays">stays</option>
       </select></label>
@@ -39,6 +50,13 @@ const LOOK_ROWS = `
         required> °</span></label>
     <label title="What opaque surfaces send on to other places, in a light that stays">
       Bounced light <input name="bounce" type="checkbox"></label>
+    <label title="The background goes from its colour at the lower edge to another one at the upper
+edge">Gradient <input name="gradient" type="checkbox"></label>
+    <label>Upper edge <input name="background_top" type="color" value="${
+  GRADIENT_TOP}"></label>`;
+/** HTML of the choice of colours. */
+const COLOUR_ROWS = `
+    ${segments("colour_by", "Colour", { one: "One", field: "Field", depth: "Depth", axis: "Axis" })}
     <label title="Colours of all surfaces: their own, or by a map">Colours
       <select name="color_map"><option value="">own</option>${choices(COLOR_MAPS)}</select></label>
     <label title="By the distance along an axis; by the second volume, the field; by the field on
@@ -48,12 +66,7 @@ caps alone; or by labels, those of the second volume or those that are drawn">Co
     <label title="Distance or value of the first colour">First colour at ${
   numberField("color_low", 'min="-1e18" max="1e18" placeholder="least"')}</label>
     <label title="Distance or value of the last colour">Last colour at ${
-  numberField("color_high", 'min="-1e18" max="1e18" placeholder="largest"')}</label>
-    <label>Background <input name="background" type="color"></label>
-    <label title="The background goes from its colour at the lower edge to another one at the upper
-edge">Gradient <input name="gradient" type="checkbox"></label>
-    <label>Upper edge <input name="background_top" type="color" value="${
-  GRADIENT_TOP}"></label>`;
+  numberField("color_high", 'min="-1e18" max="1e18" placeholder="largest"')}</label>`;
 
 /** The color_map of a State with other colours ("": the surfaces' own), or by something else. */
 export function changeColorMap(before, { colors = before?.colors ?? "", by }) {
@@ -62,7 +75,7 @@ export function changeColorMap(before, { colors = before?.colors ?? "", by }) {
   const axis = AXES[by] ?? before?.axis ?? AXES.z;
   if (by === "labels") colors = "labels"; // each has a colour of its own
   else if (before?.by === "labels" && colors === "labels") [colors] = COLOR_MAPS;
-  return { colors, by: Object.hasOwn(BY_FIELD, by) ? by : "axis", axis, range: null };
+  return { colors, by: isWay(by) ? by : "axis", axis, range: null };
 }
 
 /** Where the light is that turns with a camera: halfway between the eye and above. */
@@ -79,12 +92,17 @@ export function lightOf({ eye, at, up }) {
  */
 const hasLabelColors = (state, field) => drawsLabels(state) || Boolean(field?.labels);
 
+/** A map by the depth, as it is now, along an axis. */
+const alongView = (map, camera) => (map?.by !== "depth" ? map
+  : { ...map, by: "axis", axis: camera ? unit(sub(camera.at, camera.eye)) : AXES.z });
+
 /** What a wish says of colours, lights and the background's upper edge. field: as in welcome */
 export function lookOf(state, field) {
   const { color_map: map, lights, light, shadow, bounce, background_top: top } = state;
   const isDrawn = map?.by === "labels" ? hasLabelColors(state, field)
     : !(drawsLabels(state) && isByField(map));
-  return { background_top: top && toRgb(top), color_map: isDrawn ? map : null, lights, light,
+  return { background_top: top && toRgb(top), lights, light,
+    color_map: isDrawn ? alongView(map, state.camera) : null,
     shadow: hasOpaque(state) && light ? shadow : null,
     bounce: hasOpaque(state) && light ? bounce : 0 };
 }
@@ -113,7 +131,7 @@ function readLook(parts) {
   const isDirection = (v) => good(v, 3) && length(v) > 1e-3 && v.every((x) => Math.abs(x) <= 1);
   const state = {};
   const [colors, ...rest] = (parts.get("map") ?? "").split(",");
-  const by = Object.hasOwn(BY_FIELD, rest[0]) ? rest.shift() : "axis";
+  const by = isWay(rest[0]) ? rest.shift() : "axis";
   const axis = by === "axis" ? rest.splice(0, 3).map(number) : AXES.z;
   const range = rest.map(number);
   if (COLOR_MAPS.includes(colors) && isDirection(axis)
@@ -187,6 +205,7 @@ class Look {
   /** @param {View} view whose state it shows and changes */
   constructor(view) {
     this.view = view;
+    this.ways = []; // of colours by a field, as the page names them
     this.field = null; // the second volume, as in welcome
     this.range = new RangeFields(view, ["color_low", "color_high"], (range) =>
       view.change({ color_map: { ...view.state.color_map, range } }));
@@ -197,6 +216,8 @@ class Look {
     const change = (what) =>
       view.change({ color_map: changeColorMap(view.state.color_map, what) });
     on(view.field("color_by"), "change", (e) => change({ by: e.target.value }));
+    on(view.find("[data-name=colour_by]"), "change", ({ target: { value } }) =>
+      view.change({ color_map: this.colouredBy(value) }));
     on(view.field("color_map"), "change", ({ target: { value: colors } }) => {
       const isOfLabels = colors === "labels" && hasLabelColors(view.state, this.field);
       change({ colors, by: isOfLabels ? "labels" : undefined });
@@ -218,7 +239,14 @@ class Look {
     }
     on(view.field("gradient"), "change", ({ target: { checked } }) =>
       view.change({ background_top: checked ? view.field("background_top").value : null }));
-    on(view.field("drop_planes"), "click", () => view.change({ planes: [] }));
+  }
+
+  /** The color_map of a choice: one, field, depth, axis. */
+  colouredBy(choice) {
+    const { color_map: map } = this.view.state;
+    if (choice === "one") return null;
+    const by = choice === "field" ? this.ways[0] : choice === "axis" ? "z" : choice;
+    return changeColorMap(map, { colors: map?.colors ?? COLOR_MAPS[0], by });
   }
 
   /** A volume has come, perhaps with a field. Without one, no colours are by it. */
@@ -230,7 +258,7 @@ class Look {
 
   show(state) {
     const { view } = this;
-    const { color_map: map, planes: { length: count }, light, shadow, bounce } = state;
+    const { color_map: map, light, shadow, bounce } = state;
     const top = state.background_top;
     const isLit = light !== null && hasOpaque(state);
     view.field("light").value = light ? "stays" : "";
@@ -247,15 +275,20 @@ class Look {
       const option = view.find(`[name=color_by] [value=${by}]`);
       option.hidden = option.disabled = !isOffered[by];
     }
-    view.field("color_by").value = map ? byName(map) : "z";
-    view.field("color_by").disabled = !map;
+    this.ways = Object.keys(BY_FIELD).filter((by) => isOffered[by]);
+    check(view, "colour_by", !map ? "one" : isByField(map) ? "field" : map.by);
+    view.find("[name=colour_by][value=field]").disabled = this.ways.length === 0;
+    view.field("color_by").value = map && map.by !== "depth" ? byName(map) : "z";
+    view.field("color_by").disabled = !map || map.by === "depth";
+    for (const name of ["color_by", "color_low", "color_high"]) {
+      const isDepth = name === "color_by" && map?.by === "depth";
+      view.find(`label:has([name=${name}])`).hidden = !map || isDepth;
+    }
     for (const end of this.range.ends) end.disabled = !map || map.by === "labels";
     this.range.show(map?.range);
     view.field("background").value = view.backgroundShown();
     view.field("gradient").checked = top !== null;
     if (top) view.field("background_top").value = top;
     view.find("label:has([name=background_top])").hidden = top === null;
-    view.find(".planes").hidden = count === 0;
-    view.find(".planes span").textContent = `${count} further plane${count === 1 ? "" : "s"}`;
   }
 }

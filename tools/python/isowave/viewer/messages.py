@@ -20,6 +20,9 @@ from .protocol import MAX_TITLE, MAX_UNITS, VERSION, checked_text, first_line
 from .renderers import Renderers, may_have_labels
 from .turns import Frame, Stage
 
+#: What a probe says of a place where nothing is seen.
+NOTHING: dict[str, Any] = {"position": None, "value": None, "field": None}
+
 
 def welcome(
     volume: VolumeLike,
@@ -98,6 +101,15 @@ def status(volume: VolumeLike, renderers: Renderers) -> dict[str, Any]:
     }
 
 
+def bins_of(dtype: np.dtype[Any], value_range: tuple[float, float]) -> int:
+    """About 256 bins of a histogram; each has as many values if these are integers."""
+    low, high = value_range
+    if dtype.kind not in "iu" or not high > low:
+        return 256
+    values = int(high - low) + 1
+    return math.ceil(values / math.ceil(values / 256))
+
+
 def histogram(counts: NDArray[Any], edges: NDArray[Any], suggested: list[float]) -> dict[str, Any]:
     return {
         "type": "histogram",
@@ -110,6 +122,11 @@ def histogram(counts: NDArray[Any], edges: NDArray[Any], suggested: list[float])
 def error(raised: Exception, wish: int | None) -> dict[str, Any]:
     """An error. wish: the wish that it concerns; None: it concerns all clients."""
     return {"type": "error", "wish": wish, "message": first_line(raised)}
+
+
+def progress(frame: Frame) -> dict[str, Any]:
+    """How far a picture is."""
+    return {"type": "progress", "wish": frame.wish.id, "percent": frame.percent}
 
 
 def picture(frame: Frame, stage: str, seconds: float) -> dict[str, Any]:

@@ -30,14 +30,22 @@ export function orbit(camera, yaw, pitch, top = camera.up) {
 }
 
 /** Directions from a volume's middle to eyes that see its sides, as isowave::orientation_of(). */
-export const sidesOf = (isAnatomical) => (isAnatomical
-  ? { front: [0, -1, 0], right: [-1, 0, 0], top: [0, 0, 1] }
-  : { front: [0, 0, 1], right: [1, 0, 0], top: [0, 1, 0] });
+export const sidesOf = (isAnatomical) => {
+  const sides = isAnatomical ? { front: [0, -1, 0], right: [-1, 0, 0], top: [0, 0, 1] }
+    : { front: [0, 0, 1], right: [1, 0, 0], top: [0, 1, 0] };
+  const [back, left, bottom] = Object.values(sides).map((side) => side.map((x) => -x || 0));
+  return { ...sides, back, left, bottom };
+};
+const VIEW_NAMES = { front: "Front", left: "Left", top: "Top", back: "Back", right: "Right",
+  bottom: "Bottom" };
+/** HTML of the buttons for the sides of the volume. */
+const VIEW_BUTTONS = Object.entries(VIEW_NAMES).map(([side, name]) =>
+  `<button type="button" data-side="${side}">${name}</button>`).join("");
 
 /** The camera at a side of what it looks at, as far away as before. */
 export function seenFrom(camera, sides, side) {
   const distance = length(sub(camera.eye, camera.at));
-  const up = side === "top" ? scale(sides.front, -1) : sides.top;
+  const up = { top: sides.back, bottom: sides.front }[side] ?? sides.top;
   return { ...camera, eye: add(camera.at, scale(sides[side], distance)), up };
 }
 
@@ -65,6 +73,30 @@ export function zoom(camera, factor) {
 }
 
 /**
+ * As zoom(), but what lies under the cursor, as deep as `at`, stays there.
+ * @param {number} x of the cursor from the middle, to the right [picture heights]; y: up
+ */
+export function zoomTo(camera, factor, x, y) {
+  const forward = sub(camera.at, camera.eye);
+  const height = 2 * length(forward) * Math.tan((camera.fovy_deg * Math.PI) / 360);
+  const right = unit(cross(forward, camera.up));
+  const move = scale(add(scale(right, x), scale(cross(right, unit(forward)), y)),
+    height * (1 - factor));
+  const moved = { ...camera, eye: add(camera.eye, move), at: add(camera.at, move) };
+  return zoom(moved, factor);
+}
+
+/** The picture turns clockwise [radians]. */
+export function roll(camera, angle) {
+  return { ...camera, up: turn(camera.up, unit(sub(camera.at, camera.eye)), -angle) };
+}
+
+/** The camera looks at a point from the same side, closer by a factor. */
+export function lookAt(camera, point, factor = 1) {
+  return { ...camera, at: point, eye: add(point, scale(sub(camera.eye, camera.at), factor)) };
+}
+
+/**
  * How a key moves the camera.
  * @param {KeyboardEvent} event
  * @param {Record<string, Vec>} sides sidesOf() the volume
@@ -75,6 +107,7 @@ function moveOfKey({ key, shiftKey }, sides) {
   if (ARROWS[key] && shiftKey) return (c) => pan(c, x * PAN_STEP, y * PAN_STEP);
   if (ARROWS[key]) return (c) => orbit(c, x * ORBIT_STEP, y * ORBIT_STEP, sides.top);
   if (SIDE_KEYS[key]) return (c) => seenFrom(c, sides, SIDE_KEYS[key]);
+  if (key === "q" || key === "e") return (c) => roll(c, key === "e" ? ORBIT_STEP : -ORBIT_STEP);
   if (key === "9") return (c) => opposite(c, sides.top);
   if (key === "+" || key === "=") return (c) => zoom(c, 1 / ZOOM_STEP);
   if (key === "-" || key === "_") return (c) => zoom(c, ZOOM_STEP);

@@ -14,8 +14,9 @@ from PIL import Image as pillow
 
 from isowave._annotate import Annotations, annotated
 from isowave._camera import Camera
-from isowave._request import Request
+from isowave._request import Request, optional_color
 
+from .interfaces import ImageLike
 
 LEAST_ANNOTATED: Final = (200, 150)  # pixels of a picture, as the library has it
 
@@ -77,21 +78,24 @@ class Extent:
         return 2 if self.bounce else min(self.rays_of_hits, 1)
 
     @property
+    def is_refined(self) -> bool:
+        """Whether it has more than a ray a pixel, as they were asked for."""
+        return not self.chooses and (self.samples > 1 or self.rays_of_hits > 0)
+
+    @property
     def of_camera(self) -> Extent:
         """The same without rays of hits."""
         return replace(self, ambient=0, shadow=0, bounce=0)
 
     def within(self, max_rays: int, max_all_rays: int) -> Extent:
-        """A smaller extent. It has fewer pixels, then fewer ambient rays, then fewer shadow rays.
-
-        If rays per pixel are chosen, the most of them become fewer before all that.
+        """A smaller extent: it has fewer rays per pixel, then fewer pixels, then fewer ambient
+        rays, then fewer shadow rays.
 
         max_rays bounds the camera's rays, max_all_rays those of the hits, too.
         """
-        samples = self.samples
-        if self.chooses:
-            most_rays = min(max_rays, max_all_rays // (1 + self.rays_of_hits))
-            samples = max(1, min(samples, math.isqrt(most_rays // count_rays(self.size, 1))))
+        of_pixel = 1 + self.rays_of_hits if self.chooses else 1
+        most_rays = min(max_rays, max_all_rays // of_pixel)
+        samples = max(1, min(self.samples, math.isqrt(most_rays // count_rays(self.size, 1))))
         size = fit_size(self.size, samples, min(max_rays, max_all_rays))
         left = max(0, max_all_rays // count_rays(size, samples) - 1)  # for each hit
         shadow = min(self.shadow, left)
@@ -135,6 +139,55 @@ def share_within(
     surface = np.isfinite(depth) | (bounds > 0)
     count = int(np.count_nonzero(surface))
     return float(np.count_nonzero(bounds[surface] <= limit)) / count if count else None
+
+
+def picture_of(image: ImageLike, request: Request) -> NDArray[np.uint8]:
+    """uint8 [h, w, 3], or 4 if it is transparent."""
+    if request.transparent:
+        return image.rgba
+    rgb = image.rgb
+    assert rgb is not None  # it was asked for
+    return rgb
+
+
+def chosen_voxel_pixels(image: ImageLike, size: tuple[int, int], extent: Extent) -> float:
+    """Distance between voxels [pixels of the wish] that was chosen to keep the picture's error."""
+    if not extent.chooses:
+        return 0.0
+    chosen = float(image.statistics["detail"]["voxel_pixels"])
+    return chosen * size[1] / extent.size[1]
+
+
+def opaque(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """uint8 [h, w, 3]: a transparent picture over white."""
+    if picture.shape[2] == 3:
+        return picture
+    alpha = picture[:, :, 3:].astype(np.uint16)
+    mixed = (picture[:, :, :3] * alpha + 255 * (255 - alpha) + 127) // 255
+    return mixed.astype(np.uint8)
+
+
+def laid_over(
+    under: NDArray[np.uint8], rgb: NDArray[np.uint8], request: Request
+) -> NDArray[np.uint8]:
+    """A picture of a pass, with what was there before in place of its background.
+
+    under  uint8 [h, w, 3], of any size
+    """
+    rows, columns = rgb.shape[:2]
+    if under.shape != rgb.shape:
+        large = pillow.fromarray(under).resize((columns, rows), pillow.Resampling.BILINEAR)
+        under = np.asarray(large)
+    bottom = np.array((1, 1, 1) if request.background is None else rgb_floats(request.background))
+    top = bottom if request.background_top is None else rgb_floats(request.background_top)
+    up = 1 - (np.arange(rows)[:, None] + 0.5) / rows
+    behind = np.rint(255 * (bottom + up * (top - bottom)))[:, None].astype(np.int16)
+    is_behind = (np.abs(rgb - behind) <= 1).all(axis=2, keepdims=True)
+    return np.where(is_behind, under, rgb)
+
+
+def rgb_floats(color: Any) -> NDArray[np.float64]:
+    return np.array(optional_color(color), np.float64)
 
 
 def annotate(

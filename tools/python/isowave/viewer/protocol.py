@@ -20,8 +20,10 @@ looks nowhere.
      "annotations": {"what": ["scale-bar", "axes", "color-bar", "caption"], "units": "mm",
                      "title": "a head"} | null,
      "lights": {"ambient": 0.15, "diffuse": 0.5, "specular": 0.2, "above": 0.45} | null,
-     "light": [x, y, z] | null, "shadow": {"rays": 16, "angle": 3} | null, "bounce": 0}
+     "light": [x, y, z] | null, "shadow": {"rays": 16, "angle": 3} | null, "bounce": 0,
+     "transparent": false}
     {"type": "ack", "frame": 3}
+    {"type": "probe", "id": 5, "at": [0.5, 0.25]}
     {"type": "budget", "bytes": 600000000 | null}
     {"type": "scene", "text": "a scene file's"}
 
@@ -33,10 +35,12 @@ place of these. Surfaces and slices come without time_budget and max_error by pi
 without any max_error; surfaces and slices are 8 at most together. Ambient rays, shadow and bounce
 need a surface of opacity 1. bounce needs a light. Surfaces are those of isovalues, or of labels
 without slices and colours by the field's values. step is that of a series; 0 for a volume. The
-annotations' title is the volume's name if it is empty.
+annotations' title is the volume's name if it is empty. transparent: the lossless picture has
+alpha. A probe asks what is seen at a place of the last picture, from 0 at its left and upper edge
+to 1.
 
-Answers are dicts with a "type": welcome, status, histogram, picture (with bytes), bounds, scene,
-error; view.js describes them.
+Answers are dicts with a "type": welcome, status, histogram, picture (with bytes), progress, bounds,
+probe, scene, error; view.js describes them.
 """
 
 from __future__ import annotations
@@ -58,7 +62,7 @@ from isowave._request import LIGHTS, Request
 from isowave._slice import Slice
 from isowave._surface import MAX_LABEL, MAX_SURFACES, Surface
 
-VERSION: Final = 11
+VERSION: Final = 12
 MAX_MESSAGE_BYTES: Final = 8192
 MAX_SIDE: Final = 8192  # pixels of a picture along each axis
 MAX_SAMPLES: Final = 8  # rays of a pixel along each axis, as the library has it
@@ -129,7 +133,15 @@ class SceneFile:
     text: str
 
 
-Message = Hello | Wish | Ack | Budget | SceneFile
+@dataclass(frozen=True)
+class Probe:
+    """A question what is seen at a place of the last picture. at: x, y, 0 to 1."""
+
+    id: int
+    at: tuple[float, float]
+
+
+Message = Hello | Wish | Ack | Budget | SceneFile | Probe
 
 
 class TokenBucket:
@@ -393,6 +405,15 @@ def _shadow(content: dict[str, Any]) -> dict[str, Any]:
     }
 
 
+def _background(content: dict[str, Any]) -> dict[str, Any]:
+    """Arguments of a Request. A transparent picture has no background."""
+    background = _triple(content["background"], 0, 1, "background")
+    top = _optional_triple(content["background_top"], 0, 1, "background_top")
+    if _flag(content["transparent"], "transparent"):
+        return {"transparent": True}
+    return {"background": background, "background_top": top}
+
+
 def _bounce(content: dict[str, Any]) -> int:
     """Least number of rays that bring light."""
     rays = _integer(content["bounce"], 0, MAX_AMBIENT, "bounce")
@@ -475,8 +496,7 @@ def _read_wish(content: dict[str, Any]) -> Wish:
         light=_light(content["light"]),
         **_shadow(content),
         bounce_rays=_bounce(content),
-        background=_triple(content["background"], 0, 1, "background"),
-        background_top=_optional_triple(content["background_top"], 0, 1, "background_top"),
+        **_background(content),
         clip=_clip(content["clip"]),
         caps=_flag(content["caps"], "caps"),
         surfaces=surfaces,
@@ -502,6 +522,14 @@ def _read_budget(content: dict[str, Any]) -> Budget:
     return Budget(None if value is None else _integer(value, 1, MAX_ID, "bytes"))
 
 
+def _read_probe(content: dict[str, Any]) -> Probe:
+    at = content["at"]
+    if not isinstance(at, list) or len(at) != 2:
+        raise ProtocolError("at must be two numbers")
+    x, y = (_number(part, 0, 1, "at") for part in at)
+    return Probe(_integer(content["id"], 0, MAX_ID, "id"), (x, y))
+
+
 def _read_scene(content: dict[str, Any]) -> SceneFile:
     if not isinstance(content["text"], str):
         raise ProtocolError("text must be a text")
@@ -514,11 +542,12 @@ _READERS: Final[dict[str, tuple[dict[str, None], Callable[[dict[str, Any]], Mess
         dict.fromkeys(
             "type id isovalue size camera color background background_top samples max_error by"
             " time_budget ambient clip caps surfaces color_map slices slice_map"
-            " lights light shadow bounce step annotations".split()
+            " lights light shadow bounce step annotations transparent".split()
         ),
         _read_wish,
     ),
     "ack": (dict.fromkeys(("type", "frame")), _read_ack),
     "budget": (dict.fromkeys(("type", "bytes")), _read_budget),
     "scene": (dict.fromkeys(("type", "text")), _read_scene),
+    "probe": (dict.fromkeys(("type", "id", "at")), _read_probe),
 }

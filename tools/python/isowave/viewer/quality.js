@@ -11,22 +11,30 @@ const ERRORS = {
   picture: { unit: "FLIP", limits: [1e-6, 1] },
 };
 
+/** What a press of a look's name gives: the quality of a picture at rest. */
+const PRESETS = { draft: { samples: 1, ambient: 0 }, good: { samples: 2, ambient: 0 },
+  paper: { samples: 2, ambient: 16 } };
+const PRESET_ROWS = segments("preset", "Look", { draft: "Draft", good: "Good", paper: "Paper" });
+
 /** HTML of the panel's rows. */
 const QUALITY_ROWS = `
-    <label>Largest error <span class="unit"><input name="max_error" type="number" step="any"
+    <label title="How far the surface may be off, on the screen">Accurate to
+      <span class="unit"><input name="max_error" type="number" step="any"
       placeholder="none"> <span class="of_error"></span></span></label>
-    <label title="The error is that of the surface, by proof or by a sample, or of the picture">
-      Error judged by <select name="by">${
+    <label title="The surface, by proof or by a sample; or the whole picture, as an eye sees it">
+      Judged by <select name="by">${
   Object.keys(ERRORS).map((by) => `<option>${by}</option>`).join("")}</select></label>
     <p class="hint of_picture" hidden>FLIP is the mean difference that an eye sees between this
       picture and one of 64 rays a pixel at full detail: 0 is none, 1 the most. One ray a pixel
       often has 0.01. The renderer chooses rays and levels of detail.</p>
     <label><span class="of_samples"></span> <select name="samples">${
   SAMPLES.map((n) => `<option value="${n}">${n * n}</option>`).join("")}</select></label>
-    <label title="Rays of each point that find out how much of the sky it sees">Ambient rays
+    <label title="Light from all sides: hollows are darker. More rays, less noise">Soft shade
       <select name="ambient"><option value="0">none</option>${
-  AMBIENT.map((n) => `<option>${n}</option>`).join("")}</select></label>
-    <label>Time budget <span class="unit"><input name="time_budget" type="number"
+  AMBIENT.map((n) => `<option value="${n}">${n} rays</option>`).join("")
+}</select></label>
+    <label title="The best picture within this time">Time per picture
+      <span class="unit"><input name="time_budget" type="number"
       min="1" max="10000" step="any"
       placeholder="none"> ms</span></label>`;
 
@@ -96,6 +104,8 @@ class QualityRows {
 
   listen(on) {
     const { view } = this;
+    on(view.find("[data-name=preset]"), "change", ({ target: { value } }) =>
+      view.change(PRESETS[value]));
     const number = (name, optional) => on(view.field(name), "change", ({ target }) => {
       const value = target.value ? Number(target.value) : optional;
       if (target.validity.valid) view.change({ [name]: value });
@@ -115,6 +125,8 @@ class QualityRows {
     const { view } = this;
     const [plain, chooses] = [isPlain(state), choosesRays(state)];
     const { unit, limits: [min, max] } = ERRORS[state.by];
+    check(view, "preset", Object.keys(PRESETS).find((name) =>
+      Object.entries(PRESETS[name]).every(([key, value]) => state[key] === value)));
     view.field("by").value = state.by;
     view.field("ambient").value = state.ambient;
     view.field("samples").value = wishedQuality(state).samples;
@@ -124,7 +136,7 @@ class QualityRows {
     view.set("time_budget", state.time_budget ?? "");
     view.find(".of_error").textContent = unit;
     view.find(".of_picture").hidden = !(plain && state.by === "picture");
-    view.find(".of_samples").textContent = `${chooses ? "Most samples" : "Samples"} per pixel`;
+    view.find(".of_samples").textContent = `${chooses ? "Most rays" : "Rays"} per pixel`;
     view.field("max_error").disabled = !keepsError(state);
     view.field("by").disabled = drawsLabels(state);
     view.field("time_budget").disabled = !plain || isByField(state.color_map);

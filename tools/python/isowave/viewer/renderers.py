@@ -137,9 +137,11 @@ class Renderers:
 
     # How large pictures are.
 
-    def plan(self, wish: Wish) -> Extent:
+    def plan(self, wish: Wish, stage: Stage = Stage.WHOLE) -> Extent:
         """The whole picture of a wish, as far as the server's limits and the memory allow it."""
         extent = Extent.of(wish.request)
+        if stage is Stage.SHARP:
+            extent = Extent(extent.size, 1)
         plan = extent if self._may_have_rays else extent.of_camera
         return plan.within(self._ray_limit, self.max_rays)
 
@@ -154,8 +156,8 @@ class Renderers:
 
         The host has no limits of its own.
         """
-        made, plan = self._made, self.plan(wish)
-        if stage is not Stage.WHOLE:
+        made, plan = self._made, self.plan(wish, stage)
+        if stage not in (Stage.SHARP, Stage.WHOLE):
             width, height = (max(1, side // FIRST_DIVISOR) for side in wish.size)
             plan = Extent((width, height), 1)
         if made is None and plan.chooses:  # full detail until the device draws
@@ -210,7 +212,7 @@ class Renderers:
         """
         if self.on_host:
             return False
-        wanted, plan = self.wanted, self.plan(wish)
+        wanted, plan = self.wanted, self.plan(wish, stage)
         surfaces = max(wanted.surfaces, room_for(wish))
         if surfaces > self._most_surfaces:
             raise RuntimeError(NO_SURFACES)

@@ -7,11 +7,11 @@
     Session (session.py)      a front end's connection
 
 The newest wish of a client counts; it cancels the frame of the one before. A wish is drawn in
-stages: a first picture of a quarter of the width and height; the whole picture (sent as JPEG after
-passes); once the client rests, the lossless picture (PNG), and what is certain of it. Clients take
-turns, stage by stage; a long picture gives way to smaller ones between two passes. At most two
-pictures are on the way to a client; of those that wait for it only the last is kept, and it is
-always sent.
+stages: a first picture of a quarter of the width and height; if it asks for more than a ray a
+pixel, a sharp picture of one; the whole picture (sent as JPEG, after passes over the first one);
+once the client rests, the lossless picture (PNG), and what is certain of it. Clients take turns; a
+long picture gives way to smaller ones between two passes. At most two pictures are on the way to a
+client; of those that wait for it only the last is kept, and it is always sent.
 """
 
 from __future__ import annotations
@@ -33,14 +33,18 @@ from isowave._checked import Isovalue
 
 from . import messages
 from .interfaces import ImageLike, ProgressLike, RendererLike, SeriesLike, VolumeLike
+from .hits import Hits, seen
 from .jpeg import encode_jpeg
-from .pictures import Extent, Stopped, annotate, encode_png, share_within
-from .protocol import MAX_FLOAT32, MAX_RAYS, Ack, Budget, Message, ProtocolError, SceneFile, Wish
+from .pictures import Extent, Stopped, annotate, chosen_voxel_pixels, encode_png
+from .pictures import laid_over, opaque, picture_of, share_within
+from .protocol import MAX_FLOAT32, MAX_RAYS, Ack, Budget, Message, Probe, ProtocolError
+from .protocol import SceneFile, Wish
 from .renderers import MakeHost, RendererOptions, Renderers, make_host
 from .steps import Steps
-from .turns import Client, Frame, Post, Stage, Turns
+from .turns import Client, Frame, Post, Stage, Turns, after_first
 
 PASS_SECONDS: Final = 0.06  # between pictures of passes
+TELL_SECONDS: Final = 0.25  # between messages that say how far a picture is
 SENDING_SHARE: Final = 4  # passes get so many times the time that their pictures take
 PAUSE_SECONDS: Final = 0.03  # from a first picture to the whole one: a drag's next wish comes first
 SETTLE_SECONDS: Final = 0.1  # the same if the whole picture takes longer than that
@@ -190,6 +194,8 @@ class Scene:
                 client.post(messages.error(RuntimeError(TOO_MANY_BUDGETS), None), None)
             elif isinstance(message, SceneFile):
                 client.post(messages.scene(message.text), None)
+            elif isinstance(message, Probe) and client.asks(message):
+                self._do(lambda: self._answer(client))
             self._changed.notify_all()
 
     @property
@@ -346,6 +352,7 @@ class Scene:
         frame.by_host = renderer is self._renderers.host
         request = replace(
             extent.request(wish.request, camera),
+            outputs=("rgb",) if stage is Stage.FIRST else ("rgb", "depth"),
             on_pass=lambda so_far: self._on_pass(frame, so_far),
         )
         if frame.by_host:  # full detail until the device draws, not interrupted by a time
@@ -354,10 +361,11 @@ class Scene:
         if frame.stopped:
             self._show_what_there_is(frame, image)
             return
-        ranges = image.statistics.get("color_range"), image.statistics.get("slice_range")
-        frame.ranges = ranges
-        rgb = self._annotated(frame, picture_of(image))
-        data = encode_jpeg(rgb)
+        of = image.statistics
+        frame.ranges = of.get("color_range"), of.get("slice_range")
+        drawn = picture_of(image, request)
+        rgb = self._annotated(frame, drawn)
+        data = encode_jpeg(opaque(rgb))
         seconds = self._clock() - frame.began
         volume = self._steps.volume
         head = messages.finished_picture(frame, seconds, image, volume, self._renderers)
@@ -366,15 +374,22 @@ class Scene:
                 return
             now, client.ranges = self._clock(), frame.ranges
             client.offer(head, data, now, keep=True)
+            if stage is not Stage.FIRST and image.depth is not None:
+                client.hits = Hits(image.depth, camera, wish.step)
             if stage is Stage.FIRST:
                 # Not while the next wish is on its way: it would wait for a pass to end.
                 is_long = client.whole_seconds > SETTLE_SECONDS
                 wait = SETTLE_SECONDS if is_long else PAUSE_SECONDS
-                client.stage, client.due = Stage.WHOLE, now + wait
+                client.stage, client.due, client.under = after_first(wish), now + wait, drawn
+            elif stage is Stage.SHARP:
+                client.stage, client.due = Stage.WHOLE, now + REST_SECONDS
+                client.under, client.whole_seconds = None, now - frame.began
             else:
                 client.stage, client.due = Stage.LOSSLESS, now + REST_SECONDS
-                client.lossless, client.whole_seconds = (head, rgb), now - frame.began
-                client.voxel_pixels = chosen_voxel_pixels(image, frame)
+                client.under, client.lossless = None, (head, rgb)
+                if after_first(wish) is Stage.WHOLE:
+                    client.whole_seconds = now - frame.began
+                client.voxel_pixels = chosen_voxel_pixels(image, wish.size, extent)
 
     def _annotated(self, frame: Frame, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """The picture with its wish's annotations."""
@@ -388,6 +403,17 @@ class Scene:
         whole = replace(wish.request, camera=frame.camera, size=extent.size)
         title = self._title if names is None else names[wish.step]
         return annotate(picture, whole, wish.annotations, title, frame.ranges)
+
+    def _answer(self, client: Client) -> None:
+        """Says what is seen at places of the client's last picture."""
+        while True:
+            with self._changed:
+                probe, hits, volume = client.next_probe(), client.hits, self._steps.volume
+                if probe is None:
+                    return
+                is_there = hits is not None and hits.step == self._steps.drawn
+            place = seen(hits, probe.at, volume, self._field) if hits and is_there else {}
+            client.post({"type": "probe", "id": probe.id, **messages.NOTHING, **place}, None)
 
     def _on_pass(self, frame: Frame, so_far: ProgressLike) -> bool:
         """Sends the picture so far if it is worth it. False: the frame is to stop."""
@@ -407,17 +433,24 @@ class Scene:
                     self._encode_lossless(other, other.wish)
             # A large picture takes long to send: then passes get most of the time nevertheless.
             wait = max(PASS_SECONDS, SENDING_SHARE * frame.sending_took)
-            worth_it = (
-                frame.stage is Stage.WHOLE
-                and now - max(frame.began, frame.last_sent) >= wait
-                and frame.client.takes_more
+            under = frame.client.under
+            worth_it = frame.is_better_than_before and (
+                now - max(frame.began, frame.last_sent) >= wait and frame.client.takes_more
             )
+            if frame.stage is not Stage.FIRST and now - frame.last_told >= TELL_SECONDS:
+                frame.last_told = now
+                frame.client.post(messages.progress(frame), None)
         if worth_it:
-            data = encode_jpeg(self._annotated(frame, so_far.rgb))
+            drawn = so_far.rgb
+            if under is not None:
+                drawn = laid_over(under, drawn, frame.wish.request)
+            data = encode_jpeg(self._annotated(frame, drawn))
             frame.last_sent = self._clock()
             frame.sending_took = frame.last_sent - now
             with self._changed:
                 if not self._is_stale(frame):
+                    if under is not None:
+                        frame.client.under = drawn
                     self._offer_pass(frame, data)
         return True
 
@@ -434,7 +467,8 @@ class Scene:
         client = frame.client
         if frame.stage is not Stage.FIRST or self._clock() - client.shown < SHOW_SECONDS:
             return
-        data = encode_jpeg(self._annotated(frame, picture_of(image)))
+        drawn = opaque(picture_of(image, frame.wish.request))
+        data = encode_jpeg(self._annotated(frame, drawn))
         with self._changed:
             if client.joined:
                 self._offer_pass(frame, data)
@@ -509,16 +543,8 @@ class Scene:
             self._isovalue = self._first_isovalue()
         shown = self._first if self._shows_volume else self._field
         field = None if shown is None else messages.field(shown, self._field_name)
-        self._facts = messages.welcome(
-            self._first,
-            self._title,
-            self._range,
-            self._isovalue,
-            self._first_scene,
-            self._first_annotations,
-            field,
-            self._steps.names,
-        )
+        first = self._range, self._isovalue, self._first_scene, self._first_annotations
+        self._facts = messages.welcome(self._first, self._title, *first, field, self._steps.names)
         with self._changed:
             self._prepared = True
             for client in list(self._turns.clients):
@@ -549,7 +575,8 @@ class Scene:
         """Without one the viewer works, too: the slider then has no bars."""
         self._histogram_due = False
         try:
-            counts, edges = self._first.histogram(bins=256)
+            bins = messages.bins_of(self._first.source_dtype, self._range)
+            counts, edges = self._first.histogram(bins=bins)
         except Exception as error:
             with self._changed:
                 self._broadcast(messages.error(error, None))
@@ -565,17 +592,3 @@ class Scene:
                 self._broadcast(message)
             else:
                 self._range = float(edges[0]), float(edges[-1])
-
-
-def chosen_voxel_pixels(image: ImageLike, frame: Frame) -> float:
-    """Distance between voxels [pixels of the wish] that was chosen to keep the picture's error."""
-    if not frame.extent.chooses:
-        return 0.0
-    chosen = float(image.statistics["detail"]["voxel_pixels"])
-    return chosen * frame.wish.size[1] / frame.extent.size[1]
-
-
-def picture_of(image: ImageLike) -> NDArray[np.uint8]:
-    rgb = image.rgb
-    assert rgb is not None  # it was asked for
-    return rgb

@@ -119,7 +119,20 @@ function saveAs(blob, name) {
   setTimeout(() => URL.revokeObjectURL(link.href), 10000);
 }
 
-/** The buttons for scene files. */
+const RECENT = "isowave.scenes"; // of the browser's storage
+const MOST_RECENT = 5; // scenes
+
+/** Scenes that were opened or saved. @returns {{name: string, text: string}[]} */
+function recentScenes() {
+  try {
+    const list = JSON.parse(localStorage.getItem(RECENT));
+    return list.filter(({ name, text }) => typeof name === "string" && typeof text === "string");
+  } catch {
+    return []; // there are none, or the page has no storage
+  }
+}
+
+/** Scene files: opened, dropped, saved, recent ones. */
 class SceneFiles {
   /** @param {View} view whose state they save and change */
   constructor(view) {
@@ -131,7 +144,48 @@ class SceneFiles {
     const { view } = this;
     on(view.field("save_scene"), "click", () => this.save());
     on(view.field("open_scene"), "click", () => view.field("scene_file").click());
-    on(view.field("scene_file"), "change", (e) => this.open(e.target));
+    on(view.field("scene_file"), "change", ({ target }) => {
+      this.open(target.files[0]);
+      target.value = ""; // the same file can be opened again
+    });
+    const stage = view.find(".stage");
+    on(stage, "dragover", (e) => {
+      e.preventDefault();
+      stage.classList.add("drops");
+    });
+    on(stage, "dragleave", () => stage.classList.remove("drops"));
+    on(stage, "drop", (e) => {
+      e.preventDefault();
+      stage.classList.remove("drops");
+      this.open(e.dataTransfer.files[0]);
+    });
+    on(view.find(".recent"), "click", ({ target }) => {
+      const scene = recentScenes()[target.dataset.index];
+      if (scene) this.send(scene.name, scene.text);
+    });
+  }
+
+  keep(name, text) {
+    const others = recentScenes().filter((scene) => scene.name !== name);
+    try {
+      localStorage.setItem(RECENT,
+        JSON.stringify([{ name, text }, ...others].slice(0, MOST_RECENT)));
+    } catch {
+      // The page has no storage.
+    }
+  }
+
+  /** The list of recent scenes, as it is now. */
+  showRecent() {
+    const scenes = recentScenes();
+    this.view.find(".recent").hidden = scenes.length === 0;
+    this.view.find(".recent ul").replaceChildren(...scenes.map(({ name }, i) => {
+      const [row, button] = [document.createElement("li"), document.createElement("button")];
+      Object.assign(button, { type: "button", textContent: name });
+      button.dataset.index = i;
+      row.append(button);
+      return row;
+    }));
   }
 
   save() {
@@ -139,20 +193,30 @@ class SceneFiles {
     if (!volume) return;
     const text = writeScene(state, this.view.backgroundShown(), volume);
     saveAs(new Blob([text], { type: "application/json" }), "scene.json");
+    this.keep(`${volume.title || "Volume"}, ${new Date().toLocaleString()}`, text);
   }
 
-  /** The server reads the file: there is one reader of scenes. */
-  async open(input) {
-    const [file] = input.files;
+  /** @param {File=} file */
+  async open(file) {
     if (!file) return;
-    const message = { type: "scene", text: await file.slice(0, MAX_MESSAGE_BYTES).text() };
-    input.value = ""; // the same file can be opened again
+    if (!/\.json$/i.test(file.name)) {
+      this.view.note(`${file.name} is no scene (.json). Volumes are opened by the command: `
+        + "isowave view FILE.", "error");
+      return;
+    }
+    this.send(file.name, await file.slice(0, MAX_MESSAGE_BYTES).text());
+  }
+
+  /** The server reads the text: there is one reader of scenes. */
+  send(name, text) {
+    const message = { type: "scene", text };
     const { length: bytes } = new TextEncoder().encode(JSON.stringify(message));
     if (bytes > MAX_MESSAGE_BYTES) {
-      this.view.note(`${file.name} is too large for a scene of this page.`, "error");
-    } else {
-      this.view.home.send(message);
+      this.view.note(`${name} is too large for a scene of this page.`, "error");
+      return;
     }
+    this.sent = { name, text };
+    this.view.home.send(message);
   }
 
   /** Shows the scene of these fields. */
@@ -160,6 +224,8 @@ class SceneFiles {
     try {
       const { volume, labels } = this.view;
       this.view.change(readScene(fields, volume?.field, labels.isUseful));
+      if (this.sent) this.keep(this.sent.name, this.sent.text);
+      this.sent = null;
     } catch (error) {
       this.view.note(error.message, "error");
     }

@@ -138,12 +138,12 @@ class SliceList {
     this.range.listen(on);
   }
 
-  /** One through the middle of the volume. */
-  add(normal) {
+  /** @param {number=} offset else it goes through the middle of the volume */
+  add(normal, offset) {
     const { state: { slices }, volume } = this.view;
     if (!volume) return;
     const [low, high] = offsetsOf(normal, volume.box);
-    const slice = { normal, offset: (low + high) / 2, opacity: 1, clipped: true };
+    const slice = { normal, offset: offset ?? (low + high) / 2, opacity: 1, clipped: true };
     this.view.change({ slices: [...slices, slice] });
   }
 

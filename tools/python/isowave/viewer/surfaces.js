@@ -1,5 +1,5 @@
 // surfaces.js -- the surfaces of a picture: what wishes and URLs say of them, their list in the
-// panel, their marks on the histogram. A part of an ES module (front_end.py).
+// panel. A part of an ES module (front_end.py).
 
 /** @typedef {{isovalue: number, color: string, opacity: number, shown: boolean}} Surface */
 
@@ -28,7 +28,7 @@ export const isPlain = (state) => isOne(drawnSurfaces(state)) && state.slices.le
 export const hasOpaque = (state) => drawnSurfaces(state).some((s) => s.opacity === 1);
 
 /** @returns {boolean} whether the values of a second volume are shown, without a time budget */
-const isByField = (map) => map !== null && map.by !== "axis";
+const isByField = (map) => map !== null && !["axis", "depth"].includes(map.by);
 
 /** A State as a wish's surfaces and slices. */
 export function wishedSurfaces(state) {
@@ -120,12 +120,36 @@ class SurfaceList {
     this.view.showState();
   }
 
-  add() {
-    const { state: { surfaces }, histogram, range } = this.view;
-    if (!range) return;
-    const suggested = histogram?.suggested ?? [];
-    this.view.change({
-      surfaces: addSurface(surfaces, suggested, range), selected: surfaces.length });
+  /** @param {number=} isovalue else a suggested one, or the middle of the widest gap */
+  add(isovalue) {
+    const { state: { surfaces }, histogram: { whole } } = this.view;
+    if (!whole) return;
+    const added = addSurface(surfaces, this.peaks, whole);
+    if (isovalue !== undefined) added.at(-1).isovalue = isovalue;
+    this.view.change({ surfaces: added, selected: surfaces.length });
+  }
+
+  get peaks() {
+    return this.view.histogram.data?.suggested ?? [];
+  }
+
+  listen(on) {
+    const { view } = this;
+    on(view.field("add"), "click", () => this.add());
+    on(view.field("peak"), "change", ({ target }) => {
+      this.add(Number(target.value));
+      target.value = "";
+    });
+  }
+
+  /** The suggested isovalues that no surface has. */
+  showPeaks(surfaces) {
+    const field = this.view.field("peak");
+    const left = this.peaks.filter((peak) => surfaces.every((s) => s.isovalue !== peak));
+    if (field.dataset.left === `${left}`) return;
+    field.dataset.left = left;
+    field.replaceChildren(new Option("Add at peak …", ""),
+      ...left.map((peak) => new Option(toText(peak), peak)));
   }
 
   remove(index) {
@@ -146,7 +170,7 @@ class SurfaceList {
       row.toggleAttribute("aria-current", false);
       if (i === selected && surfaces.length > 1) row.setAttribute("aria-current", "true");
       color.value = surface.color;
-      color.disabled = map?.by === "axis";
+      color.disabled = map !== null && !isByField(map);
       if (value !== list.getRootNode().activeElement) {
         value.value = Number.isFinite(surface.isovalue) ? toText(surface.isovalue) : "";
       }
@@ -158,6 +182,9 @@ class SurfaceList {
       remove.disabled = surfaces.length === 1;
     });
     view.field("add").disabled = isFull(state) || drawsLabels(state);
+    this.showPeaks(surfaces);
+    view.field("peak").disabled = view.field("add").disabled
+      || view.field("peak").options.length < 2;
   }
 
   addRow(i) {
@@ -180,38 +207,4 @@ class SurfaceList {
       this.edit(i, { shown: eye.getAttribute("aria-pressed") !== "true" }));
     remove.addEventListener("click", () => this.remove(i));
   }
-}
-
-/**
- * Draws bars of log(1 + count), those that the selected surface encloses in the accent's colour;
- * and the isovalues of the other surfaces as lines in their colours.
- * @param {HTMLCanvasElement} canvas
- * @param {{counts: number[], range: [number, number]}} histogram
- * @param {[number, number]} range of the slider
- */
-function paintHistogram(canvas, histogram, [low, high], surfaces, selected) {
-  const ratio = devicePixelRatio;
-  const [width, height] = [canvas.clientWidth * ratio, canvas.clientHeight * ratio];
-  if (!(width > 0)) return;
-  Object.assign(canvas, { width, height });
-  const context = canvas.getContext("2d");
-  const { color, outlineColor } = getComputedStyle(canvas); // the bars', in this scheme
-  const { counts, range: [from, to] } = histogram;
-  const inset = (THUMB / 2) * ratio; // the thumb's middle goes from here to there
-  const x = (v) => Math.round(inset + ((v - low) / (high - low || 1)) * (width - 2 * inset));
-  const most = Math.log1p(Math.max(...counts, 1));
-  counts.forEach((count, i) => {
-    const [a, b] = [i, i + 1].map((k) => from + ((to - from) * k) / counts.length);
-    const bar = (Math.log1p(count) / most) * (height - ratio);
-    const inside = b > surfaces[selected].isovalue;
-    context.fillStyle = inside ? color : outlineColor;
-    context.globalAlpha = inside ? 0.55 : 1;
-    context.fillRect(x(a), height - bar, Math.max(1, x(b) - x(a)), bar);
-  });
-  surfaces.forEach((surface, i) => {
-    if (i === selected || !surface.shown) return;
-    context.globalAlpha = 1;
-    context.fillStyle = surface.color;
-    context.fillRect(x(surface.isovalue) - ratio, 0, 2 * ratio, height);
-  });
 }

@@ -51,7 +51,7 @@ class Timeline {
     const isSeries = this.names.length > 1;
     view.find("output + span").textContent = this.names.length - 1;
     if (isSeries) view.find(".volume").append(`, ${this.names.length} steps`);
-    view.find(".ends span + span").textContent = `voxels${isSeries ? " of step 0" : ""}, log scale`;
+    view.histogram.note = isSeries ? "voxels of step 0" : "voxels";
   }
 
   /** The step of a wish, which the series has. */

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from isowave._camera import Camera
 
+from .hits import Hits
 from .pictures import Extent
-from .protocol import ProtocolError, Wish
+from .protocol import Probe, ProtocolError, Wish
 from .steps import Steps
 
 MAX_IN_FLIGHT: Final = 2  # pictures on the way to a client
@@ -31,11 +32,22 @@ class Stage(Enum):
     """What is to be done next for a client's wish."""
 
     FIRST = "first"
+    SHARP = "sharp"  # the whole picture with a ray a pixel, before one with more rays
     WHOLE = "whole"
     LOSSLESS = "lossless"
     ENCODING = "encoding"  # the lossless picture, in a thread of its own
     CERTAIN = "certain"
     DONE = "done"
+
+
+DRAWN: Final = (Stage.FIRST, Stage.SHARP, Stage.WHOLE)  # by the renderer, for a wish's picture
+
+
+def after_first(wish: Wish) -> Stage:
+    """The stage after the first picture. More rays are added to a picture that is sharp."""
+    request = wish.request
+    is_kept = request.max_image_error is not None or request.time_budget is not None
+    return Stage.SHARP if Extent.of(request).is_refined and not is_kept else Stage.WHOLE
 
 
 @dataclass(eq=False)
@@ -50,6 +62,8 @@ class Client:
     due: float = -math.inf  # when the stage may begin
     ranges: tuple[Any, Any] = (None, None)  # of the wish's colours, once they are known
     voxel_pixels: float = 0.0  # chosen for the wish's whole picture, to keep the picture's error
+    under: NDArray[np.uint8] | None = None  # what the wish shows where a pass has no hits yet
+    hits: Hits | None = None  # of the last picture with all pixels
     lossless: tuple[dict[str, Any], NDArray[np.uint8]] | None = None  # what it is made of
     sent: int = 0  # pictures, numbered from 1
     acked: int = 0
@@ -57,6 +71,19 @@ class Client:
     whole_seconds: float = math.inf  # of the last whole picture
     shown: float = -math.inf  # when the last picture was sent
     joined: bool = True
+    probe: Probe | None = None  # the last one that waits for an answer
+    is_answered: bool = False  # by a thread
+
+    def asks(self, probe: Probe) -> bool:
+        """Keeps a probe, in place of one that waits. Returns whether none is being answered."""
+        is_first, self.probe, self.is_answered = not self.is_answered, probe, True
+        return is_first
+
+    def next_probe(self) -> Probe | None:
+        """The one to answer; None: there is none, and the next one needs a thread."""
+        probe, self.probe = self.probe, None
+        self.is_answered = probe is not None and self.joined
+        return probe if self.joined else None
 
     def take(self, wish: Wish) -> None:
         """The next wish, which ends the one before. Raises ProtocolError."""
@@ -64,13 +91,14 @@ class Client:
             raise ProtocolError("the numbers of wishes must grow")
         skip_first = self.whole_seconds < QUICK_SECONDS or wish.request.time_budget is not None
         self.wish, self.camera = wish, wish.request.camera
-        self.stage = Stage.WHOLE if skip_first else Stage.FIRST
+        self.stage = after_first(wish) if skip_first else Stage.FIRST
         self.gave_way, self.lossless, self.due = 0, None, -math.inf
+        self.under = self.hits = None
         self.ranges, self.voxel_pixels = (None, None), 0.0
 
     def leave(self) -> None:
         self.joined = False
-        self.wish = self.lossless = self.waiting = None
+        self.wish = self.lossless = self.waiting = self.under = self.hits = None
         self.stage = Stage.DONE
 
     @property
@@ -116,8 +144,16 @@ class Frame:
     percent: float = 0.0  # of its rays that have ended
     by_host: bool = False
     last_sent: float = -math.inf
+    last_told: float = -math.inf  # of its percent
     sending_took: float = 0.0  # seconds of the last picture of a pass
     stopped: bool = False
+
+    @property
+    def is_better_than_before(self) -> bool:
+        """Whether a pass shows more than the page does; pictures within a time do by themselves."""
+        request = self.wish.request
+        is_shown = self.client.under is not None or request.time_budget is not None
+        return self.stage is not Stage.FIRST and is_shown and not request.transparent
 
 
 class Turns:
@@ -177,14 +213,13 @@ class Turns:
             return client.due
         leave_at = self._steps.leave_at
         stays = any(
-            other.stage in (Stage.FIRST, Stage.WHOLE) and not self._needs_other_renderer(other)
-            for other in self.clients
+            other.stage in DRAWN and not self._needs_other_renderer(other) for other in self.clients
         )
         return max(client.due, leave_at) if stays or math.isinf(leave_at) else client.due
 
     def _needs_other_renderer(self, client: Client) -> bool:
         """Whether the client's stage needs a renderer of another step, or of labels."""
-        needs_renderer = client.stage in (Stage.FIRST, Stage.WHOLE, Stage.CERTAIN)
+        needs_renderer = client.stage in (*DRAWN, Stage.CERTAIN)
         return needs_renderer and client.wish is not None and not self._suits(client.wish)
 
     def _may_begin(self, client: Client) -> bool:
@@ -205,11 +240,11 @@ class Turns:
         """
         client = frame.client
         turn = min(GIVE_WAY_SECONDS * 2.0**client.gave_way, TURN_SECONDS)
-        if frame.stage is not Stage.WHOLE or now - frame.began < turn:
+        if frame.stage is Stage.FIRST or now - frame.began < turn:
             return False
         gives_way = any(
             other.wish is not None
-            and other.stage in (Stage.FIRST, Stage.WHOLE)
+            and other.stage in DRAWN
             and self.has_turn(other)
             and fitted(other.wish, other.stage).all_rays < frame.extent.all_rays
             for other in self.clients

@@ -1,7 +1,8 @@
 // view.js -- a view: pictures come from a scene (scene.py), wishes go to it. A part of
 // an ES module (front_end.py).
 //
-// What the front end says (protocol.py checks it): hello, wish, ack, budget, scene. What it hears:
+// What the front end says (protocol.py checks it): hello, wish, ack, budget, probe, scene. What it
+// hears:
 //
 //   welcome    title, shape [z,y,x], spacing, box [[x,y,z], [x,y,z]] in world space,
 //              anatomical: whether that is a patient's, LPS; dtype, range [low, high],
@@ -14,15 +15,17 @@
 //              otherwise than the host, or ""), device_memory (null on the host), memory_bytes,
 //              memory_budget, nbytes of the compressed volume
 //   histogram  counts of equally wide bins, range, suggested isovalues
-//   picture    wish, step, frame, stage: first, pass, whole, lossless; format, size, samples,
-//              ambient, shadow, bounce, camera, isovalue, complete, passes, decoded_blocks,
-//              percent, ms, detail; samples: of one whose rays are chosen, before it is finished,
-//              the most;
+//   picture    wish, step, frame, stage: first, pass, sharp, whole, lossless; format, size,
+//              samples, ambient, shadow, bounce, camera, isovalue, complete, passes,
+//              decoded_blocks, percent, ms, detail; samples: of one whose rays are chosen,
+//              before it is finished, the most;
 //              rays_cut: of a finished one, how many rays have more hits than are drawn;
 //              field_range: of a finished one, the least and the largest value of the field at the
 //              hits, or null;
 //              reduced: why a finished one has fewer rays than its wish, or null; notice: of a
 //              finished one, that the isovalue is outside the volume's values, or ""; and its bytes
+//   progress   wish, percent: how far its picture is
+//   probe      id, position in world space, value there, field: the second volume's; null: nothing
 //   scene      fields of the scene file that was sent, as _core.parse_scene() gives them
 //   bounds     wish, within_pixel: the share of the surface that is certainly so near to that of
 //              the volume before compression; null: there is no surface. errors_are_stated: that
@@ -35,14 +38,19 @@
 
 /** @typedef {Record<string, any>} Message */
 /**
+ * @typedef {{send: (message: Message) => void, close: () => void}} Connection
  * @typedef {{send: (message: Message) => void, wheel: (view: View) => boolean, hash: boolean,
- *    isDark: () => boolean}} Home where a view is. wheel: whether the wheel is the view's
+ *    isDark: () => boolean, beside: (receive: (head: Message, data?: BlobPart) => void) =>
+ *    Connection}} Home where a view is. wheel: whether the wheel is the view's; beside: another
+ *    connection to the scene
  */
 
-const VERSION = 11;
+const VERSION = 12;
 const MIN_WAIT_MS = 15; // between two wishes
 const MAX_IN_WAIT_MS = 120; // for a picture of the last wish, before the next one is sent
 const MAX_PIXEL_RATIO = 2;
+const RATIO_MS = 1000; // between looks at the density of the screen
+const WORK_MS = 700; // until the page says how far a picture is
 const DARK = "(prefers-color-scheme: dark)";
 
 const isFresher = (a, b) => a.wish > b.wish || (a.wish === b.wish && a.frame > b.frame);
@@ -57,6 +65,7 @@ class View {
     this.home = home;
     this.root = host.shadowRoot ?? host.attachShadow({ mode: "open" });
     this.root.innerHTML = HTML;
+    this.root.querySelector("[name=share]").hidden = !home.hash;
     const sheet = new CSSStyleSheet();
     sheet.replaceSync(CSS);
     this.root.adoptedStyleSheets = [sheet];
@@ -74,7 +83,18 @@ class View {
     if (home.hash) Object.assign(this.state, readHash(location.hash, this.state));
     this.sides = sidesOf(false);
     this.isNew = !(home.hash && location.hash.length > 1); // shows the server's scene first
+    this.history = new History(this);
+    this.menus = new Menus(this);
+    this.sheet = new Sheet(this);
+    this.histogram = new Histogram(this);
+    this.tools = new Tools(this);
+    this.gestures = new Gestures(this);
+    this.cameras = new Cameras(this);
+    this.cube = new Cube(this);
+    this.overlay = new Overlay(this);
+    this.export = new Export(this);
     this.surfaces = new SurfaceList(this);
+    this.planes = new PlaneList(this);
     this.quality = new QualityRows(this);
     this.look = new Look(this);
     this.slices = new SliceList(this);
@@ -84,6 +104,7 @@ class View {
     this.scenes = new SceneFiles(this);
     this.wish = 0;
     this.shown = this.arrived = { wish: -1, frame: -1 };
+    this.isAtRest = false; // all pixels of the newest wish are shown
     this.answered = true; // there is a picture of the last wish, or an error
     this.sentAt = -Infinity;
     this.scheduled = this.held = 0;
@@ -91,7 +112,7 @@ class View {
     this.ended = new AbortController();
     this.listen();
     this.showState();
-    this.setOpen(host.clientWidth > 640);
+    this.sheet.setStop(this.sheet.isSmall ? 0 : 2);
   }
 
   // From the scene.
@@ -100,6 +121,7 @@ class View {
   connected() {
     this.shown = this.arrived = { wish: this.shown.wish, frame: -1 };
     this.volume = null;
+    this.tools.waiting.clear();
     this.note("Starting …", "passing");
     this.home.send({ type: "hello", version: VERSION });
   }
@@ -110,7 +132,8 @@ class View {
    */
   receive(head, data) {
     const takers = { welcome: this.welcome, status: this.showStatus, error: this.showError,
-      histogram: this.showHistogram, bounds: this.showBounds, scene: this.scenes.take };
+      histogram: this.showHistogram, bounds: this.showBounds, scene: this.scenes.take,
+      progress: this.showWork, probe: this.tools.take };
     if (head.type === "picture") return this.showPicture(head, data);
     takers[head.type]?.call(this, head);
   }
@@ -120,29 +143,19 @@ class View {
     this.sides = sidesOf(head.anatomical);
     this.find(".frame").classList.remove("starting");
     const [z, y, x] = head.shape;
-    this.find("h1").textContent = head.title || "Volume";
+    this.find(".title").textContent = this.find(".title").title = head.title || "Volume";
     this.find(".volume").textContent =
       `${x} × ${y} × ${z} ${head.dtype}, ${toShort(head.bits_per_voxel)} bits per voxel`;
     if (this.home.hash && head.title) document.title = `${head.title} – isowave`;
-    for (const part of [this.look, this.labels, this.annotations, this.time]) part.welcome(head);
+    for (const part of [this.look, this.labels, this.annotations, this.histogram, this.time]) {
+      part.welcome(head);
+    }
     if (this.isNew && head.scene) this.scenes.use(head.scene);
     if (this.isNew && head.annotations) this.state.annotations = head.annotations;
     this.isNew = false;
     if (!Number.isFinite(this.surface.isovalue)) this.surface.isovalue = head.isovalue;
-    this.setRange(head.range);
-    this.push();
-  }
-
-  setRange([low, high]) {
-    const slider = this.field("slider");
-    const whole = /int/.test(this.volume.dtype);
-    const step = (high - low) / 1000;
-    Object.assign(slider, { min: low, max: high });
-    slider.step = whole ? Math.max(1, Math.round(step)) : step;
-    const [left, , right] = this.root.querySelectorAll(".ends span");
-    [left.textContent, right.textContent] = [toText(low), toText(high)];
-    this.range = [low, high];
     this.showState();
+    this.push();
   }
 
   showStatus(head) {
@@ -170,7 +183,10 @@ class View {
       this.time.play(false);
       this.time.came(false);
     }
-    this.note(head.message, head.wish === null ? "error" : "drawing");
+    // In the units of the field that budgets are given in.
+    const text = /budget/.test(head.message) ? head.message.replaceAll(/(\d{6,})( bytes)?/g,
+      (_, bytes) => `${Math.ceil(bytes / 2 ** 20).toLocaleString("en")} MiB`) : head.message;
+    this.note(text, head.wish === null ? "error" : "drawing");
   }
 
   async showPicture(head, data) {
@@ -210,25 +226,48 @@ class View {
     this.answered = true;
     this.failed = false;
     this.clearNote("passing", "drawing");
-    if (!this.state.camera && !this.resetDue) this.state.camera = this.homeCamera = head.camera;
+    if (!this.state.camera && !this.resetDue) this.takeCamera(head.camera);
     const rest = head.stage === "whole" || head.stage === "lossless";
+    this.isAtRest = rest || head.stage === "sharp";
     this.progress(rest ? 100 : head.percent ?? 50);
+    if (head.stage === "sharp") this.progress(0);
     this.time.came(rest);
     if (rest) this.list(".facts", factsOf(head, this.state));
     const notes = [head.notice, head.reduced].filter(Boolean);
     if (rest && notes.length) this.note(notes.join(" "), "drawing");
     if (head.stage === "lossless") {
-      this.lossless = { wish: head.wish, blob: new Blob([data], { type: "image/png" }) };
-      if (this.wantsShot) this.download();
       this.say(`Isovalue ${toText(head.isovalue)}, ${head.complete ? "" : "not "}complete.`);
       this.keepHash();
     }
   }
 
+  /** The camera that shows everything. */
+  takeCamera(camera) {
+    this.state.camera = this.homeCamera = camera;
+    this.showState();
+    if (this.state.color_map?.by === "depth") this.push(); // now it is known how deep
+  }
+
+  /** How far the picture is that is wished for. */
+  showWork({ wish, percent }) {
+    if (wish !== this.wish) return;
+    const now = performance.now();
+    this.progress(Math.min(percent, 99));
+    if (now - this.sentAt < WORK_MS) return;
+    const what = this.isAtRest ? "Adding light and detail" : "Drawing";
+    this.find(".work").textContent = percent < 100 ? `${what} … ${Math.round(percent)} %`
+      : `${what} …`;
+    this.find(".work").hidden = false;
+  }
+
   /** How near the surface is to that of the volume before compression. */
   showBounds(head) {
     if (head.wish !== this.wish || head.within_pixel === null) return;
-    this.find(".facts").append(...boundsElements(head));
+    const elements = boundsElements(head);
+    this.find(".facts").append(...elements);
+    const [name, value] = elements.map((element) => element.textContent);
+    this.find(".certain").textContent = `${name} ${value.split(" ").slice(2).join(" ")}: ${
+      value.split(" ").slice(0, 2).join(" ")}`;
   }
 
   list(selector, facts) {
@@ -240,14 +279,7 @@ class View {
   }
 
   showHistogram(head) {
-    this.histogram = head;
-    this.drawHistogram();
-  }
-
-  drawHistogram() {
-    if (!this.histogram || !this.range) return;
-    const { surfaces, selected } = this.state;
-    paintHistogram(this.find(".histogram canvas"), this.histogram, this.range, surfaces, selected);
+    this.histogram.set(head);
   }
 
   // To the scene.
@@ -276,35 +308,58 @@ class View {
   sendWish() {
     delete this.host.dataset.pending;
     this.resetDue = false;
-    const { width, height } = this.picture.getBoundingClientRect();
+    const { width, height } = this.sizeWished;
     if (!(width >= 1 && height >= 1)) return; // hidden: the observer pushes when it is not
-    const ratio = Math.min(devicePixelRatio, MAX_PIXEL_RATIO);
-    const { clip, planes, camera, caps } = this.state;
     this.wish += 1;
-    this.answered = false;
+    this.answered = this.isAtRest = false;
     this.sentAt = performance.now();
     if (!(this.began.wish <= this.wish)) this.began = { wish: this.wish, at: this.sentAt };
     this.host.dataset.wish = this.wish;
     this.progress(0);
-    this.home.send({
+    this.find(".certain").textContent = "";
+    this.tools.say(null);
+    this.home.send(this.wishOf(this.wish, [width, height], this.state));
+    this.time.wished();
+  }
+
+  /** Width and height of the picture [pixels]. */
+  get sizeWished() {
+    const { width, height } = this.picture.getBoundingClientRect();
+    const ratio = Math.min(devicePixelRatio, MAX_PIXEL_RATIO);
+    const pixels = (side) => (side >= 1 ? clamp(Math.round(side * ratio), 1, 8192) : 0);
+    return { width: pixels(width), height: pixels(height) };
+  }
+
+  /**
+   * The message that asks for the picture of a state.
+   * @param {number} id
+   * @param {[number, number]} size
+   * @param {State} state
+   * @param {boolean} transparent
+   */
+  wishOf(id, size, state, transparent = false) {
+    const { clip, planes, camera, caps } = state;
+    return {
       type: "wish",
-      id: this.wish,
-      size: [width, height].map((side) => clamp(Math.round(side * ratio), 1, 8192)),
+      id,
+      size,
       step: this.time.step,
       camera,
       background: toRgb(this.backgroundShown()),
       clip: [...clipPlanes(clip, this.volume.box), ...planes],
       caps,
-      ...lookOf(this.state, this.volume.field),
-      ...wishedSurfaces(this.state),
-      ...wishedQuality(this.state),
-      ...wishedAnnotations(this.state),
-    });
-    this.time.wished();
+      ...lookOf(state, this.volume.field),
+      ...(transparent && { background_top: null }),
+      ...wishedSurfaces(state),
+      ...wishedQuality(state),
+      ...wishedAnnotations(state),
+      transparent,
+    };
   }
 
   /** Changes the state, shows it, wishes for it. */
   change(changes) {
+    if (this.volume) this.history.note();
     Object.assign(this.state, changes);
     if (changes.camera === null) this.resetDue = true; // pictures before have the camera before
     // A frame keeps an error or a time; what was given last counts.
@@ -313,6 +368,11 @@ class View {
     this.clearNote("error");
     this.showState();
     this.push();
+  }
+
+  /** The view that shows everything. */
+  reset() {
+    this.change({ camera: null });
   }
 
   /** The selected surface, which the slider moves. */
@@ -341,6 +401,11 @@ class View {
     this.narrow = narrow;
   }
 
+  /** The unit of the world's lengths; "": it is not known. */
+  get unit() {
+    return this.state.annotations.units || (this.volume?.anatomical ? "mm" : "");
+  }
+
   backgroundShown() {
     return this.state.background ?? (this.home.isDark() ? "#14171a" : "#ffffff");
   }
@@ -349,16 +414,17 @@ class View {
 
   showState() {
     const { state } = this;
-    const { isovalue } = this.surface;
-    const value = Number.isFinite(isovalue) ? toText(isovalue) : "";
-    this.set("isovalue", value);
-    this.field("slider").value = isovalue;
-    this.field("slider").setAttribute("aria-valuetext", value);
     this.clips.forEach((slider, i) => { slider.value = state.clip[i]; });
     this.field("caps").checked = state.caps;
     for (const part of [this.labels, this.surfaces, this.quality, this.look, this.slices,
-      this.annotations, this.time]) part.show(state);
-    this.drawHistogram();
+      this.planes, this.annotations, this.time, this.histogram, this.cube, this.overlay,
+      this.history, this.export]) part.show(state);
+  }
+
+  /** A menu was opened. */
+  opened(name) {
+    if (name === "export_menu") this.export.show();
+    if (name === "file_menu") this.scenes.showRecent();
   }
 
   /** Not while somebody types there. */
@@ -392,11 +458,7 @@ class View {
     const bar = this.find(".bar");
     bar.style.width = `${percent}%`;
     bar.classList.toggle("busy", percent < 100);
-  }
-
-  setOpen(open) {
-    this.find(".frame").classList.toggle("closed", !open);
-    this.find(".toggle").setAttribute("aria-expanded", open);
+    if (percent === 0 || percent === 100) this.find(".work").hidden = true;
   }
 
   keepHash() {
@@ -411,111 +473,50 @@ class View {
     const on = (target, type, act, options) =>
       target.addEventListener(type, act, { signal, ...options });
     this.began = { wish: Infinity, at: 0 };
-    on(this.root, "keydown", (e) => e.stopPropagation()); // notebooks have keys of their own
-    this.listenToPicture(on);
     this.listenToFields(on);
+    this.listenToResolution();
     on(matchMedia(DARK), "change", () => this.change({}));
     if (this.home.hash) {
       on(window, "hashchange", () => this.change(readHash(location.hash, this.state)));
     }
     const observer = new ResizeObserver(() => {
-      this.drawHistogram();
       this.keepInView();
+      this.showState();
       this.push();
     });
     observer.observe(this.picture);
     on(signal, "abort", () => observer.disconnect());
   }
 
-  listenToPicture(on) {
-    const { picture } = this;
-    const fingers = new Map();
-    const forget = (e) => fingers.delete(e.pointerId);
-    on(picture, "pointerdown", (e) => {
-      picture.setPointerCapture(e.pointerId);
-      fingers.set(e.pointerId, e);
-    });
-    on(picture, "pointermove", (e) => {
-      const last = fingers.get(e.pointerId);
-      if (!last) return;
-      this.drag(fingers, last, e);
-      fingers.set(e.pointerId, e);
-    });
-    for (const type of ["pointerup", "pointercancel"]) on(picture, type, forget);
-    on(picture, "contextmenu", (e) => e.preventDefault());
-    on(picture, "dblclick", () => this.change({ camera: null }));
-    on(picture, "wheel", (e) => this.wheel(e), { passive: false });
-    on(picture, "keydown", (e) => this.key(e));
-    on(this.root, "copy", (e) => this.onClipboard(e, () =>
-      e.clipboardData.setData("text/plain", this.cameraText())));
-    on(this.root, "paste", (e) => this.onClipboard(e, () =>
-      this.pasteCamera(e.clipboardData.getData("text/plain"))));
-  }
-
-  onClipboard(event, act) {
-    if (this.root.activeElement !== this.picture) return;
-    event.preventDefault();
-    act();
-  }
-
-  drag(fingers, last, now) {
-    const height = this.picture.clientHeight;
-    const dx = (now.clientX - last.clientX) / height;
-    const dy = (now.clientY - last.clientY) / height;
-    if (fingers.size > 1) {
-      const other = [...fingers.values()].find((f) => f.pointerId !== now.pointerId);
-      const apart = (f) => Math.hypot(f.clientX - other.clientX, f.clientY - other.clientY) || 1;
-      const factor = apart(last) / apart(now);
-      // Each finger moves the middle by half of its way.
-      this.move((c) => zoom(pan(c, dx / 2, dy / 2), factor));
-    } else if (now.buttons & 2 || now.buttons & 4 || now.shiftKey) {
-      this.move((c) => pan(c, dx, dy));
-    } else {
-      this.move((c) => orbit(c, dx * Math.PI, dy * Math.PI, this.sides.top));
-    }
-  }
-
-  wheel(event) {
-    if (!event.ctrlKey && !this.home.wheel(this)) return; // the page is to scroll
-    event.preventDefault();
-    const pixels = event.deltaY * [1, 16, 400][event.deltaMode];
-    const strength = event.ctrlKey ? 0.01 : 0.001; // pinches of touchpads come as ctrl and wheel
-    this.move((c) => zoom(c, Math.exp(clamp(pixels * strength, -1, 1))));
-  }
-
-  key(event) {
-    if (event.ctrlKey || event.metaKey || event.altKey) return;
-    const move = moveOfKey(event, this.sides);
-    if (move) this.move(move);
-    else if (event.key === "0") this.change({ camera: null });
-    else return;
-    event.preventDefault();
+  /** A window that comes to a screen of another density wants other pixels. */
+  listenToResolution() {
+    const { signal } = this.ended;
+    let ratio = devicePixelRatio;
+    const check = () => {
+      if (devicePixelRatio === ratio) return;
+      ratio = devicePixelRatio;
+      this.showState();
+      this.push();
+      listen();
+    };
+    const listen = () => matchMedia(`(resolution: ${ratio}dppx)`)
+      .addEventListener("change", check, { once: true, signal });
+    listen();
+    const timer = setInterval(check, RATIO_MS); // not all browsers tell of it each time
+    signal.addEventListener("abort", () => clearInterval(timer));
   }
 
   listenToFields(on) {
-    for (const name of ["isovalue", "slider"]) {
-      on(this.field(name), "input", ({ target }) => target.validity.valid
-        && this.surfaces.edit(this.state.selected, { isovalue: Number(target.value) }));
-    }
-    on(this.field("add"), "click", () => this.surfaces.add());
     this.clips.forEach((slider, i) => on(slider, "input", () =>
       this.change({ clip: moveClip(this.state.clip, i, Number(slider.value)) })));
     on(this.field("caps"), "change", (e) => this.change({ caps: e.target.checked }));
-    for (const part of [this.quality, this.look, this.slices, this.labels, this.annotations,
-      this.time, this.scenes]) part.listen(on);
+    for (const part of [this.history, this.quality, this.look, this.slices, this.labels,
+      this.annotations, this.time, this.scenes, this.surfaces, this.planes, this.histogram,
+      this.menus, this.sheet, this.tools, this.gestures, this.cameras, this.cube, this.overlay,
+      this.export]) part.listen(on);
     on(this.find(".budget"), "submit", (e) => this.sendBudget(e));
     on(this.field("budget"), "change", (e) => this.sendBudget(e));
-    on(this.find(".toggle"), "click", () => this.setOpen(this.find(".closed") !== null));
-    on(this.field("reset"), "click", () => this.change({ camera: null }));
-    on(this.field("shot"), "click", () => this.shoot());
-    on(this.field("copy"), "click", () => this.copyCamera());
-    on(this.field("paste"), "click", () => this.openPaste(this.find("form.paste").hidden));
-    on(this.field("cancel"), "click", () => this.openPaste(false));
-    on(this.find("form.paste"), "submit", (e) => {
-      e.preventDefault();
-      if (this.pasteCamera(this.field("camera").value)) this.openPaste(false);
-    });
-    on(this.find("form.paste"), "keydown", (e) => e.key === "Escape" && this.openPaste(false));
+    on(this.field("share"), "click", () => this.share());
   }
 
   sendBudget(event) {
@@ -527,63 +528,28 @@ class View {
     this.home.send({ type: "budget", bytes });
   }
 
-  // Screenshot and camera.
-
-  shoot() {
-    this.wantsShot = true;
-    if (this.lossless?.wish === this.wish) this.download();
-    else this.say("The screenshot follows with the lossless picture.");
-  }
-
-  download() {
-    this.wantsShot = false;
-    const step = this.time.names.length > 1 ? `_step${this.time.shown}` : "";
-    const what = drawsLabels(this.state) ? "labels" : toText(this.surface.isovalue);
-    saveAs(this.lossless.blob, `isowave_${what}${step}.png`);
-  }
-
-  cameraText() {
-    return writeCamera(this.state.camera, this.picture.width, this.picture.height);
-  }
-
-  async copyCamera() {
-    if (!this.state.camera) return;
-    try {
-      await navigator.clipboard.writeText(this.cameraText());
-      this.flash("copy", "Copied");
-    } catch {
-      this.openPaste(true); // no access to the clipboard: there it can be copied by hand
-      this.field("camera").value = this.cameraText();
-      this.field("camera").select();
+  /** The page's address shows what it shows now. */
+  async share() {
+    this.keepHash();
+    if (!await this.copyText(location.href, "share")) {
+      this.note("The address of this page shows the same view: copy it from there.", "error");
     }
   }
 
-  flash(name, text) {
+  /** @returns {Promise<boolean>} whether the text is on the clipboard; the button says so */
+  async copyText(text, name) {
+    try {
+      await navigator.clipboard.writeText(text);
+    } catch {
+      return false; // no access
+    }
     const button = this.field(name);
     const before = button.dataset.text ?? button.textContent;
     Object.assign(button.dataset, { text: before });
-    button.textContent = text;
-    this.say(text);
+    button.textContent = "Copied";
+    this.say("Copied");
     setTimeout(() => { button.textContent = before; }, 1500);
-  }
-
-  openPaste(open) {
-    this.find("form.paste").hidden = !open;
-    this.field("paste").setAttribute("aria-expanded", open);
-    this.find(".problem").textContent = "";
-    this.field(open ? "camera" : "paste").focus();
-  }
-
-  /** @returns {boolean} whether it was a camera */
-  pasteCamera(text) {
-    try {
-      this.change({ camera: readCamera(text) });
-      return true;
-    } catch (error) {
-      if (this.find("form.paste").hidden) this.note(error.message, "error");
-      this.find(".problem").textContent = error.message;
-      return false;
-    }
+    return true;
   }
 
   close() {
