@@ -10,7 +10,7 @@
 
 #include "core/accuracy/certify.hpp"
 #include "core/api/turns.hpp"
-#include "core/frame/soon_renderer.hpp"
+#include "core/frame/soon.hpp"
 #include "core/zfp/zfp_stream.hpp"
 #include "isowave/device.hpp"
 #include "isowave/renderer.hpp"
@@ -57,7 +57,7 @@ struct Renderer::Implementation {
   DeviceInfo device_info{};
   Grid grid{};
   std::vector<std::string> notices{};
-  core::SoonRenderer *soon = nullptr;  ///< the renderer, if it is one
+  core::Soon *soon = nullptr;  ///< the renderer, if it is one
 
  private:
   /// The whole volume's finest level, without waiting until a device is ready.

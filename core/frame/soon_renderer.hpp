@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "core/frame/renderer.hpp"
+#include "core/frame/soon.hpp"
 
 namespace isowave::core {
 
@@ -36,26 +37,21 @@ struct SoonParts {
 ///
 /// ready(), ready_for(), abilities(), memory_bytes(), wait() and give_up() may be called from any
 /// thread.
-class SoonRenderer : public RendererAround {
+class SoonRenderer : public RendererAround, public Soon {
  public:
   /// Returns at once.
   explicit SoonRenderer(SoonParts parts);
   /// Requests a stop, and waits for it.
   ~SoonRenderer() override = default;
 
-  /// Whether the renderer that takes long is made, or has failed.
-  bool ready() const { return is_ready_; }
+  bool ready() const override { return is_ready_; }
   /// Whether render() does not wait until ready() for a request that needs such abilities.
   bool ready_for(const FrameRequest &request) const;
-  /// Waits until ready().
-  ///
-  /// Throws  the error of making the renderer
-  void wait() const;
-  /// Requests a stop of the making, and does not wait.
-  void give_up() { maker_.request_stop(); }
+  void wait() const override;
+  void give_up() override { maker_.request_stop(); }
 
   Abilities abilities() const override { return parts_.abilities; }
-  const Abilities &meanwhile_abilities() const { return parts_.meanwhile_abilities; }
+  const Abilities &meanwhile_abilities() const override { return parts_.meanwhile_abilities; }
   Team &team() override { return alone_; }
   /// Waits until ready() if no frame was drawn.
   std::vector<VolumeInfo> levels() const override;
@@ -67,7 +63,6 @@ class SoonRenderer : public RendererAround {
   Camera label_camera(std::span<const std::uint16_t> labels, std::optional<ImageSize> size = {},
                       const Viewpoint &from = {}) override;
   void clear_cache() override;
-  /// Memory of the renderer that took long, after its last call; 0 before it is ready.
   std::uint64_t memory_bytes() const override { return is_ready_ ? memory_bytes_.load() : 0; }
   double setup_ms() const override { return is_ready_ && made_ ? made_->setup_ms() : 0; }
 

@@ -294,7 +294,8 @@ std::optional<BlockBox> HostBlocks::box_of(Holds holds) const {
   parallel_for((num_macrocells_ + kRunMacrocells - 1) / kRunMacrocells, num_threads_,
                [&](std::uint64_t run, std::uint32_t) {
                  std::optional<BlockBox> box_here;
-                 const std::size_t end = std::min(num_macrocells_, (run + 1) * kRunMacrocells);
+                 const std::size_t end =
+                     std::min<std::uint64_t>(num_macrocells_, (run + 1) * kRunMacrocells);
                  for (std::size_t macrocell = run * kRunMacrocells; macrocell < end; ++macrocell) {
                    const ulong mask = holds(macrocell);
                    if (mask == 0) continue;

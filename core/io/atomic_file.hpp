@@ -38,7 +38,7 @@ class AtomicFile {
   ///
   /// Throws  Error: disk full and such
   void write(std::span<const std::byte> bytes);
-  void write(std::string_view text) { write(std::as_bytes(std::span(text))); }
+  void write(std::string_view text) { write(std::as_bytes(std::span(text.data(), text.size()))); }
   /// For libraries that want a C stream (libpng); errors set on it are found by commit().
   std::FILE *stream() { return file_; }
 

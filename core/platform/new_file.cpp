@@ -4,7 +4,9 @@
 #include <fmt/format.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#ifdef __linux__
 #include <sys/xattr.h>
+#endif
 #include <unistd.h>
 
 #include <array>
@@ -72,11 +74,13 @@ void keep_permissions(const fs::path &replaced, std::FILE *file) {
   // Only root can give a file away: an ordinary user becomes the owner.
   if (old.st_uid != made.st_uid && ::fchown(descriptor, old.st_uid, kSameGroup) != 0) errno = 0;
   // Before the mode, which then also limits what the list grants.
+#ifdef __linux__
   constexpr const char *kAccessList = "system.posix_acl_access";
   std::array<char, 1 << 12> list{};
   const ssize_t length = ::getxattr(replaced.c_str(), kAccessList, list.data(), list.size());
   if (length > 0)
     ::fsetxattr(descriptor, kAccessList, list.data(), static_cast<std::size_t>(length), 0);
+#endif
   ::fchmod(descriptor, mode);
 }
 

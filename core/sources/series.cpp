@@ -10,6 +10,7 @@
 
 #include "core/base/error.hpp"
 #include "core/platform/matching_files.hpp"
+#include "core/platform/threads.hpp"
 #include "core/zfp/zfp_file.hpp"
 
 namespace isowave::core {
@@ -152,7 +153,7 @@ CompressedVolume Series::open(std::size_t index) {
 void Series::prepare(std::size_t index) {
   if (index >= size() || prepared_ == index) return;
   prepared_ = index;
-  next_ = std::async(std::launch::async, [this, index] { return load(index); });
+  next_ = std::async(platform::kBeside, [this, index] { return load(index); });
 }
 
 CompressedVolume Series::load(std::size_t index) const {

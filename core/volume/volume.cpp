@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <limits>
 #include <stdexcept>
 #include <vector>
 
@@ -69,6 +71,12 @@ void check_volume_info(const VolumeInfo &info, std::string_view what) {
       throw Error("{}: dims {}x{}x{}: each must be 2 to {}", what, info.dims.x, info.dims.y,
                   info.dims.z, kMaxDim);
     }
+  }
+  // Sizes of memory have so many bits.
+  constexpr std::uint64_t kMaxVoxels = std::numeric_limits<std::size_t>::max() / 8;
+  if (const std::uint64_t voxels = info.num_voxels(); voxels > kMaxVoxels) {
+    throw Error("{}: {} voxels: this build, whose addresses have {} bits, takes at most {}", what,
+                voxels, 8 * sizeof(std::size_t), kMaxVoxels);
   }
   if (!finite(info.spacing) || glm::any(glm::lessThanEqual(info.spacing, glm::dvec3(0.0)))) {
     throw Error("{}: spacing {} {} {}: each must be finite and above 0", what, info.spacing.x,

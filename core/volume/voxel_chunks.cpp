@@ -13,6 +13,7 @@
 #include "core/base/error.hpp"
 #include "core/base/parallel_for.hpp"
 #include "core/base/text.hpp"
+#include "core/platform/threads.hpp"
 #include "core/volume/block_errors.hpp"
 
 namespace isowave::core {
@@ -413,7 +414,7 @@ ValueRange read_in_chunks(VolumeReader &reader, const InputOptions &options, Chu
   };
   const bool is_exact = fits_float32(reader.info().type);
   const auto read_ahead = [&](std::uint64_t z, Layers &layers) {
-    return std::async(std::launch::async, [&, z] {
+    return std::async(platform::kBeside, [&, z] {
       layers.voxels = layers.floats.take(layer * layers_at(z));
       if (!is_exact) layers.source = layers.doubles.take(layers.voxels.size());
       if (layers_at(z) == 0) return;

@@ -76,7 +76,7 @@ BlockError error_of_block(const std::array<float, ISO_BLOCK_VOXELS> &decoded, co
   BlockError error;
   for (std::uint32_t z = 0; z < row.nz; ++z) {
     for (std::uint32_t y = 0; y < row.ny; ++y) {
-      const float *source = row.voxels + z * layer + y * nx + std::ptrdiff_t{bx} * kBlockEdge;
+      const float *source = row.voxels + z * layer + y * nx + std::ptrdiff_t(bx) * kBlockEdge;
       for (std::uint32_t x = 0; x < num_x; ++x) {
         const std::uint32_t voxel = x + 4 * y + 16 * z;
         if ((row.no_data[bx] >> voxel & 1u) != 0) continue;
@@ -101,7 +101,7 @@ class ErrorMeter : public ChunkCoder {
   ErrorMeter(const glm::uvec3 &dims, const Candidates &candidates, double limit, bool rounded,
              std::uint32_t num_threads)
       : nx_(dims.x),
-        layer_(std::ptrdiff_t{dims.x} * dims.y),
+        layer_(std::ptrdiff_t(dims.x) * dims.y),
         blocks_x_((dims.x + 3) / 4),
         first_(candidates.first),
         num_candidates_(std::size_t(candidates.last - candidates.first + 1)),
@@ -317,7 +317,7 @@ void ErrorBoundCoder::begin_chunk(const Chunk &chunk) {
 void ErrorBoundCoder::code_row(const BlockRow &row, std::uint32_t) {
   CodedRow &coded = rows_[row.index];
   BlockCodec codec(bound_.min_exponent);
-  const std::ptrdiff_t layer = std::ptrdiff_t{dims_.x} * dims_.y;
+  const std::ptrdiff_t layer = std::ptrdiff_t(dims_.x) * dims_.y;
   const std::uint32_t blocks_x = (dims_.x + 3) / 4;
   coded.lengths.reserve(blocks_x);
   for (std::uint32_t bx = 0; bx < blocks_x; ++bx) {
@@ -328,7 +328,7 @@ void ErrorBoundCoder::code_row(const BlockRow &row, std::uint32_t) {
     const auto &decoded = codec.decode(bound_.min_exponent);
     errors_->some()[row.index * blocks_x + bx] =
         error_of_block(decoded, row, bx, dims_.x, layer, bound_.whole_numbers);
-    float *out = decoded_.data() + (row.voxels - chunk_.data()) + std::ptrdiff_t{bx} * kBlockEdge;
+    float *out = decoded_.data() + (row.voxels - chunk_.data()) + std::ptrdiff_t(bx) * kBlockEdge;
     const std::uint32_t num_x = std::min(kBlockEdge, dims_.x - bx * kBlockEdge);
     for (std::uint32_t z = 0; z < row.nz; ++z) {
       for (std::uint32_t y = 0; y < row.ny; ++y)

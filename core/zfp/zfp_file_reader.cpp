@@ -199,9 +199,10 @@ class ZfpFileReader {
     if ((refused & voxels) == 0) return missing & voxels;
     const auto voxel = static_cast<std::uint32_t>(std::countr_zero(refused & voxels));
     const glm::u64vec3 blocks(volume_.num_blocks());
-    const glm::u64vec3 at = 4ul * glm::u64vec3(block % blocks.x, block / blocks.x % blocks.y,
-                                               block / blocks.x / blocks.y) +
-                            glm::u64vec3(voxel & 3u, voxel >> 2u & 3u, voxel >> 4u);
+    const glm::u64vec3 at =
+        std::uint64_t{4} * glm::u64vec3(block % blocks.x, block / blocks.x % blocks.y,
+                                        block / blocks.x / blocks.y) +
+        glm::u64vec3(voxel & 3u, voxel >> 2u & 3u, voxel >> 4u);
     if (std::isinf(values[voxel])) {
       fail(
           "voxel x={}, y={}, z={} is infinite: decode the file by zfp -h -z, and compress its "

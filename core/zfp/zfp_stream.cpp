@@ -187,9 +187,9 @@ std::vector<float> decode_with_libzfp(const CompressedVolume &volume, double vox
     // A lying index may end a block before its bits do.
     if (volume.is_indexed())
       zfp_stream_set_params(stream.get(), ZFP_MIN_BITS, length, ZFP_MAX_PREC, bound.min_exponent);
-    const auto layer = std::ptrdiff_t{dims.x} * dims.y;
+    const auto layer = std::ptrdiff_t(dims.x) * dims.y;
     zfp_decode_partial_block_strided_float_3(
-        stream.get(), voxel + at.x + std::ptrdiff_t{dims.x} * at.y + layer * at.z, size.x, size.y,
+        stream.get(), voxel + at.x + std::ptrdiff_t(dims.x) * at.y + layer * at.z, size.x, size.y,
         size.z, 1, dims.x, layer);
   }
   round_to(whole_numbers_of(volume.info.type, bound), voxels);

@@ -127,7 +127,7 @@ std::uint32_t combine_crcs(std::uint32_t first, std::uint32_t second, std::uint6
 
 std::uint32_t json_crc(std::string_view text, const ZfpFooter &footer) {
   const std::array<std::uint32_t, 3> numbers{footer.version, footer.json_bytes, footer.stream_crc};
-  return update_crc(update_crc(0, std::as_bytes(std::span(text))),
+  return update_crc(update_crc(0, std::as_bytes(std::span(text.data(), text.size()))),
                     std::as_bytes(std::span(numbers)));
 }
 

@@ -44,6 +44,9 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#if !defined(__GLIBC__) && !defined(__FP_FAST_FMAF)
+#include "fma_by_double.h"
+#endif
 #define ISO_CHECK_SIZE(T, n) static_assert(sizeof(T) == (n), #T " layout changed")
 #define ISO_NAMESPACE_BEGIN namespace isowave::core {
 #define ISO_NAMESPACE_END }
@@ -64,7 +67,13 @@ using uchar = std::uint8_t;
 using std::ceil;
 using std::fabs;
 using std::floor;
+#ifdef ISOWAVE_FMA_BY_DOUBLE_H
+inline float fma(float a, float b, float c) {
+  return fma_by_double(a, b, c);
+}
+#else
 using std::fma;
+#endif
 using std::rint;
 using std::sqrt;
 inline uint popcount(uint x) {

@@ -1,0 +1,46 @@
+#!/usr/bin/env bash
+# wasm_test.sh <source folder> <build folder> <program>: the library that tools/wasm builds reads,
+# compresses, draws and extracts under node with the bits of the program, which does so on a device.
+set -euo pipefail
+source=$1 build=$2 program=$3
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+
+fail() {
+  echo "$*"
+  exit 1
+}
+
+quietly() { # quietly COMMAND...
+  "$@" > "$work/log" 2>&1 || { cat "$work/log"; fail "$1 fails"; }
+}
+
+# Only what has changed since the last run is built.
+export NODE_PATH=/usr/share/nodejs
+quietly "$source/tools/wasm" "$build"
+quietly emcmake cmake -G Ninja -S "$source/tests/host_only" -B "$work/user" \
+  -DCMAKE_BUILD_TYPE=Release -DCMAKE_FIND_ROOT_PATH="$build/install;$build/prefix" \
+  -DCMAKE_CXX_FLAGS="$(cat "$build/flags")"
+quietly cmake --build "$work/user"
+
+# VOLUME ISOVALUE OPTION...: a volume of each kind of voxels, each with a file's own spacing.
+same_bits() {
+  local volume=$source/tests/data/$1 isovalue=$2
+  rm -rf "$work/wasm" "$work/native"
+  mkdir "$work/wasm" "$work/native"
+  quietly node --no-experimental-fetch "$work/user/host_only.js" "$volume" "$isovalue" "$work/wasm"
+  (cd "$work/native"
+   quietly "$program" convert "$volume" -o volume.zfp
+   quietly "$program" render "$volume" -i "$isovalue" --size 320x180 -o picture.png --depth depth.npy
+   quietly "$program" extract "$volume" -i "$isovalue" -o mesh.ply
+   tail -c $((320 * 180 * 4)) depth.npy > depth)
+  for file in volume.zfp picture.png depth mesh.ply; do
+    cmp "$work/wasm/$file" "$work/native/$file" || fail "$1: $file of WebAssembly is another"
+  done
+}
+same_bits fuel_64x33x32_uint8.raw.gz 10
+
+if node --no-experimental-fetch "$work/user/host_only.js" missing.nrrd 10 "$work" 2> "$work/error"; then
+  fail 'a missing file is no error'
+fi
+[ "$(wc -l < "$work/error")" = 1 ] || fail "an error of $(wc -l < "$work/error") lines"
