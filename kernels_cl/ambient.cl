@@ -97,8 +97,10 @@ kernel void ambient_enter(const FrameParams frame_params, global const ClipParam
   for (uint pixel = get_global_id(0); pixel < num_pixels; pixel += get_global_size(0)) {
     const GivenRay ray = given[pixel];
     if (!is_given(ray)) continue;
-    const float begin = entry_of(clip, ray, voxel_of(first_level, ray));
-    given[pixel] = ray_from(ray, begin);
-    if (has_nearest) nearest[pixel].t = t_from(frame, nearest[pixel].t, begin);
+    const RayEntrance at = entrance_of(clip, ray, voxel_of(first_level, ray));
+    given[pixel] = entering(clip, ray, at);
+    if (has_nearest)
+      nearest[pixel].t =
+          t_from(frame->view.t_scale * voxel_in_first(ray), nearest[pixel].t, at.begin);
   }
 }

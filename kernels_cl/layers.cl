@@ -8,6 +8,7 @@
 /// Each surface has its own hits, which march replaces by the next ones on the same rays. Behind
 /// the first layer, everything costs O(rays that go on), which layers_blend lists.
 #include "device/block_requests.h"
+#include "device/level_borders.h"
 #include "device/pass_counts.h"
 #include "device/store_pixels.h"
 #include "device/work_group.h"
@@ -17,9 +18,31 @@
 #include "portable/ray_state.h"
 #include "portable/window.h"
 
+/// A ray's nearest hit on slices that it has not passed yet, in any level of detail.
+ISO_INLINE HitRecord nearest_of_levels(const FrameParams *frame_params,
+                                       global const FrameParams *frames, uint num_frames,
+                                       global const ClipParams *clip,
+                                       global const LayerParams *layers, uint passed, uint ray) {
+#if ISO_LEVELS
+  HitRecord nearest = no_hit();
+  (void)frame_params;
+  for (uint level = 0; level < num_frames; ++level) {
+    const FrameParams frame = frames[level];
+    const HitRecord hit = nearest_slice(&frame, clip, layers, passed, ray);
+    if (hit.t < nearest.t) nearest = hit;
+  }
+  return nearest;
+#else
+  (void)frames;
+  (void)num_frames;
+  return nearest_slice(frame_params, clip, layers, passed, ray);
+#endif
+}
+
 /// Takes a surface's hits into the layer where they are the nearest. If hits are at one place, the
 /// surface that is taken first stays. A layer begins with the nearest hits on slices.
 ///
+/// frame_params, frames, num_frames  as start_rays
 /// surface       its number
 /// begins_layer  1: the layer has no hits yet
 /// is_first      1: the layer is the frame's first, of all rays
@@ -29,18 +52,20 @@
 ///               them to 0
 /// Out           layer [height * width]
 /// Launch        grid-stride over rays
-kernel void layers_choose(const FrameParams frame_params, uint surface, uint begins_layer,
-                          uint is_first, global const ClipParams *clip,
-                          global const LayerParams *layers, global const LayerCounts *counts,
-                          global const uint *rays, global const HitRecord *hits,
-                          global uchar *passed, global HitRecord *layer) {
+kernel void layers_choose(const FrameParams frame_params, global const FrameParams *frames,
+                          uint num_frames, uint surface, uint begins_layer, uint is_first,
+                          global const ClipParams *clip, global const LayerParams *layers,
+                          global const LayerCounts *counts, global const uint *rays,
+                          global const HitRecord *hits, global uchar *passed,
+                          global HitRecord *layer) {
   const uint has_slices = layers->slices.num_planes != 0;
   const uint num_rays = is_first ? frame_rays(&frame_params) : counts->rays;
   for (uint i = get_global_id(0); i < num_rays; i += get_global_size(0)) {
     const uint ray = is_first ? i : rays[i];
     if (begins_layer && has_slices) {
       if (is_first) passed[ray] = 0;
-      layer[ray] = nearest_slice(&frame_params, clip, layers, passed[ray], ray);
+      layer[ray] =
+          nearest_of_levels(&frame_params, frames, num_frames, clip, layers, passed[ray], ray);
     }
     const float before = begins_layer && !has_slices ? INFINITY : layer[ray].t;
     if (hits[ray].t < before) {
@@ -60,6 +85,7 @@ kernel void layers_forget(const FrameParams frame_params, global HitRecord *laye
 
 /// Blends a layer behind the layers before, and lists the rays that go on.
 ///
+/// frame_params  of the finest level of detail, which need not draw
 /// blends   ISO_COUNTS_ALONE: counts the layer's hits. ISO_PREVIEWS: writes colors and counts.
 ///          ISO_BLENDS: all of Out and In, Out
 /// open_counts, num_ambient, num_shadow, bounced, num_bounced  of the layer's hits: LightOfHits

@@ -53,7 +53,7 @@ ISO_INLINE void find_round(const FrameParams *level, global const uint *macrocel
   if (is_first && m->lanes == 1) { /* most rays of a cold frame wait right there */
     m->blocks[0] = m->next;
     m->num_blocks = 1;
-    m->next = block_behind(level, ray, block_coords(level, m->next), last);
+    m->next = block_behind_stand(level, ray, block_coords(level, m->next), m->stand.side, last);
   } else {
     m->num_blocks =
         find_blocks_from(level, macrocell_masks, ray, is_first ? m->stand.side : ISO_SIDE_UNKNOWN,
@@ -111,9 +111,10 @@ ISO_INLINE int leave(const RayMarch *m, uint behind, global uint *ray_block_ids,
   return waits || crosses;
 }
 
-/// Does the ray end in this lane, without a hit? In frames of one level of detail.
+/// Does the ray end in this lane, without a hit, or leave its band?
 ISO_INLINE int ends_without_hit(const RayMarch *m) {
-  return (m->is_gone && m->lane == 0) || m->result == ISO_RAY_ENDS;
+  const int is_gone = m->is_gone && m->lane == 0;
+  return ISO_BANDS ? leaves_band(m->result, is_gone) : is_gone || m->result == ISO_RAY_ENDS;
 }
 
 /// Walks rays on until they hit, leave or wait. A ray that leaves the band of its level waits

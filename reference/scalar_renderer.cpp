@@ -88,57 +88,96 @@ HitRecord trace(const FrameParams &frame, const float *voxels, Solver solver, co
   return trace_box(frame, voxels, solver, ray, enter, {glm::ivec3(0), {last.x, last.y, last.z}});
 }
 
-/// The first hit of a ray in its interval, in one level. inside: in, is the ray where the interval
-/// begins, if it comes from another level; out, where the interval ends, if the ray gets there
-/// within the domain, in a cell that has all its data.
+/// Where a ray goes on from.
+struct BandStart {
+  GridWalk cell;
+  RayEvent enter;   ///< by which it enters the cell, or begins there
+  uint number = 0;  ///< of changes in the cell that lie before
+  /// The side on which it was before it begins there; none: it was on none, or this does not
+  /// matter.
+  std::optional<bool> before = std::nullopt;
+};
+
+/// The first hit of a ray in its interval in one level, from a place of its way on. inside: out,
+/// where the interval ends, if the ray gets there within the domain, in a cell that has all its
+/// data.
+HitRecord trace_band_from(const FrameParams &frame, const float *voxels, Solver solver,
+                          const Ray &ray, const ClipParams &clip, const BandStart &start,
+                          std::optional<bool> &inside) {
+  const LastPlanes last = last_planes(&frame);
+  const RayEvent end = border_event(ray.end_t);
+  const CellBox domain{glm::ivec3(0), {last.x, last.y, last.z}};
+  GridWalk cell = start.cell;
+  RayEvent enter = start.enter;
+  std::optional<bool> before = start.before;
+  for (uint number = start.number; contains(domain, cell); number = 0) {
+    RayEvent exit = walk_exit(&cell, &ray);
+    const bool ends = !event_before(exit, end);
+    if (ends) exit = end;
+    CellChange change;
+    float w[8];
+    load_corners(frame, voxels, cell.x, cell.y, cell.z, w);
+    const auto hit_at = [&](float s) {
+      return make_hit(&frame, &ray, w, cell.x, cell.y, cell.z, enter, exit, s);
+    };
+    const auto inside_now = [&](RayEvent event, bool leaving) {
+      return inside_at(&ray, w, event, cell.x, cell.y, cell.z, leaving) != 0;
+    };
+    if (before && !lacks_data(w) && inside_now(enter, false) != before) {
+      HitRecord hit = hit_at(0.0f);
+      mark_beginning(&clip, &ray, &hit);
+      return hit;
+    }
+    before.reset();
+    const bool changes =
+        number == 0
+            ? change_in_cell(solver, &ray, w, cell.x, cell.y, cell.z, enter, exit, &change) != 0
+            : numbered_change_in_cell(&ray, w, cell.x, cell.y, cell.z, enter, exit, number, 1,
+                                      &change) != 0;
+    if (changes) {
+      HitRecord hit = hit_at(refine(solver, change.cubic, change.bracket));
+      hit.cell |= number << ISO_CROSSING_BIT;
+      return hit;
+    }
+    if (ends) {
+      if (!lacks_data(w)) inside = inside_now(exit, true);
+      break;
+    }
+    walk_step(&cell, &ray, exit, 1, last);
+    enter = exit;
+  }
+  return no_hit();
+}
+
+/// The same from where the interval begins. inside: in, is the ray there, if it comes from another
+/// level.
 HitRecord trace_band(const FrameParams &frame, const float *voxels, Solver solver, const Ray &ray,
                      const ClipParams &clip, std::optional<bool> &inside) {
   const LastPlanes last = last_planes(&frame), zero{};
-  const RayEvent end = border_event(ray.end_t);
-  RayEvent enter = border_event(ray.begin_t), exit = end;
-  HitRecord hit = no_hit();
+  RayEvent enter = border_event(ray.begin_t), exit = border_event(ray.end_t);
   std::optional<bool> before = std::exchange(inside, std::nullopt);
-  const bool has_cap = begins_at_cap(&clip, &ray);
-  if (has_cap) before = false;
-  if (!clip_to_box(&ray, zero, last, &enter, &exit)) return hit;
-  bool at_border = enter.axis == ISO_AXIS_START && before.has_value();
+  if (begins_at_cap(&clip, &ray)) before = false;
+  if (!clip_to_box(&ray, zero, last, &enter, &exit)) return no_hit();
+  if (enter.axis != ISO_AXIS_START) before.reset();
   const CellBox domain{glm::ivec3(0), {last.x, last.y, last.z}};
-  walk_cells(frame, ray, enter, domain,
-             [&](const GridWalk &cell, RayEvent cell_enter, RayEvent cell_exit) {
-               const bool ends = !event_before(cell_exit, end);
-               if (ends) cell_exit = end;
-               CellChange change;
-               float w[8];
-               load_corners(frame, voxels, cell.x, cell.y, cell.z, w);
-               const auto inside_now = [&](RayEvent event, bool leaving) {
-                 return inside_at(&ray, w, event, cell.x, cell.y, cell.z, leaving) != 0;
-               };
-               if (at_border && !lacks_data(w) && inside_now(cell_enter, false) != before) {
-                 hit =
-                     make_hit(&frame, &ray, w, cell.x, cell.y, cell.z, cell_enter, cell_exit, 0.0f);
-                 if (has_cap) cap_hit(&clip, &ray, &hit);
-                 return true;
-               }
-               at_border = false;
-               if (change_in_cell(solver, &ray, w, cell.x, cell.y, cell.z, cell_enter, cell_exit,
-                                  &change)) {
-                 hit = make_hit(&frame, &ray, w, cell.x, cell.y, cell.z, cell_enter, cell_exit,
-                                refine(solver, change.cubic, change.bracket));
-                 return true;
-               }
-               if (ends && !lacks_data(w)) inside = inside_now(cell_exit, true);
-               return ends;
-             });
-  return hit;
+  return trace_band_from(frame, voxels, solver, ray, clip,
+                         {enter_box(ray, enter, 1, domain, last), enter, 0, before}, inside);
 }
 
-/// With its block's number among those of all levels.
-HitRecord among_levels(const FrameParams &frame, HitRecord hit) {
-  const uint x = hit.block_id % frame.grid.blocks_x,
-             y = hit.block_id / frame.grid.blocks_x % frame.grid.blocks_y,
-             z = hit.block_id / frame.grid.blocks_x / frame.grid.blocks_y;
-  hit.block_id = x + frame.place.blocks_x * (y + frame.place.blocks_y * (frame.place.begin_z + z));
-  return hit;
+/// The same behind a hit, whose block is one of the level's own.
+HitRecord trace_band_behind(const FrameParams &frame, const float *voxels, const Ray &ray,
+                            const ClipParams &clip, const HitRecord &hit,
+                            std::optional<bool> &inside) {
+  const LastPlanes last = last_planes(&frame);
+  const RayEvent begin = border_event(ray.begin_t);
+  const BlockCoords b = block_coords(&frame, hit.block_id);
+  const GridWalk cell = walk_from(&ray, static_cast<int>(4 * b.x + (hit.cell & 3u)),
+                                  static_cast<int>(4 * b.y + (hit.cell >> 2 & 3u)),
+                                  static_cast<int>(4 * b.z + (hit.cell >> 4 & 3u)), 1, last);
+  RayEvent enter = region_entry(&ray, cell.x, cell.y, cell.z, 1, last);
+  if (event_before(enter, begin)) enter = begin;
+  return trace_band_from(frame, voxels, kDefaultSolver, ray, clip,
+                         {cell, enter, crossings_up_to(hit)}, inside);
 }
 
 /// hit: its block is number block_id of the frame's own level.
@@ -214,38 +253,6 @@ void append_segments(const FrameParams &frame, std::span<const float> voxels, co
       });
 }
 
-HitRecord trace_scalar_behind(const FrameParams &frame, std::span<const float> voxels,
-                              const Ray &ray, const HitRecord &hit) {
-  check_voxels(frame, voxels);
-  const LastPlanes last = last_planes(&frame);
-  const RayEvent begin = border_event(ray.begin_t), end = border_event(ray.end_t);
-  const BlockCoords b = block_coords(&frame, hit.block_id);
-  GridWalk cell = walk_from(&ray, static_cast<int>(4 * b.x + (hit.cell & 3u)),
-                            static_cast<int>(4 * b.y + (hit.cell >> 2 & 3u)),
-                            static_cast<int>(4 * b.z + (hit.cell >> 4 & 3u)), 1, last);
-  RayEvent enter = region_entry(&ray, cell.x, cell.y, cell.z, 1, last);
-  if (event_before(enter, begin)) enter = begin;
-  const CellBox domain{glm::ivec3(0), {last.x, last.y, last.z}};
-  for (uint number = crossings_up_to(hit); contains(domain, cell); number = 0) {
-    RayEvent exit = walk_exit(&cell, &ray);
-    const bool ends = !event_before(exit, end);
-    if (ends) exit = end;
-    CellChange change;
-    float w[8];
-    load_corners(frame, voxels.data(), cell.x, cell.y, cell.z, w);
-    if (numbered_change_in_cell(&ray, w, cell.x, cell.y, cell.z, enter, exit, number, 1, &change)) {
-      HitRecord next = make_hit(&frame, &ray, w, cell.x, cell.y, cell.z, enter, exit,
-                                refine(kDefaultSolver, change.cubic, change.bracket));
-      next.cell |= number << ISO_CROSSING_BIT;
-      return next;
-    }
-    if (ends) break;
-    walk_step(&cell, &ray, exit, 1, last);
-    enter = exit;
-  }
-  return no_hit();
-}
-
 Ray in_band(const FrameParams &frame, Ray ray) {
   ray.begin_t = frame.band.begin_t;
   ray.end_t = frame.band.end_t;
@@ -253,9 +260,11 @@ Ray in_band(const FrameParams &frame, Ray ray) {
 }
 
 HitRecord trace_scalar(const FrameParams &frame, std::span<const float> voxels, Solver solver,
-                       const Ray &ray) {
+                       const Ray &ray, const ClipParams &clip) {
   check_voxels(frame, voxels);
-  return trace(frame, voxels.data(), solver, ray);
+  std::optional<bool> inside;
+  return ray.cut_by == ISO_NOT_CUT ? trace(frame, voxels.data(), solver, ray)
+                                   : trace_band(frame, voxels.data(), solver, ray, clip, inside);
 }
 
 HitRecord trace_scalar_by_blocks(const FrameParams &frame, std::span<const float> voxels,
@@ -287,16 +296,60 @@ std::vector<HitRecord> render_scalar(const FrameParams &frame, std::span<const f
   });
 }
 
-HitRecord trace_scalar_levels(std::span<const FrameParams> frames,
-                              std::span<const std::vector<float>> voxels, Solver solver,
-                              std::span<const Ray> rays, const ClipParams &clip) {
+namespace {
+
+/// The first hit in the levels from a given one on. inside: as trace_band()
+HitRecord trace_levels_from(std::size_t level, std::span<const FrameParams> frames,
+                            std::span<const std::vector<float>> voxels, Solver solver,
+                            std::span<const Ray> rays, const ClipParams &clip,
+                            std::optional<bool> inside) {
   HitRecord hit = no_hit();
-  std::optional<bool> inside;
-  for (std::size_t level = 0; level < frames.size() && !std::isfinite(hit.t); ++level) {
+  for (; level < frames.size() && !std::isfinite(hit.t); ++level) {
     if (!draws(frames[level])) continue;
     hit = trace_band(frames[level], voxels[level].data(), solver, rays[level], clip, inside);
     if (std::isfinite(hit.t)) hit = among_levels(frames[level], hit);
   }
+  return hit;
+}
+
+}  // namespace
+
+HitRecord trace_scalar_levels(std::span<const FrameParams> frames,
+                              std::span<const std::vector<float>> voxels, Solver solver,
+                              std::span<const Ray> rays, const ClipParams &clip) {
+  return trace_levels_from(0, frames, voxels, solver, rays, clip, std::nullopt);
+}
+
+HitRecord trace_scalar_behind(std::span<const FrameParams> frames,
+                              std::span<const std::vector<float>> voxels, std::span<const Ray> rays,
+                              const HitRecord &hit, const ClipParams &clip) {
+  const std::size_t level = level_of_hit(frames, hit);
+  std::optional<bool> inside;
+  const HitRecord next = trace_band_behind(frames[level], voxels[level].data(), rays[level], clip,
+                                           within_level(frames[level], hit), inside);
+  return std::isfinite(next.t)
+             ? among_levels(frames[level], next)
+             : trace_levels_from(level + 1, frames, voxels, kDefaultSolver, rays, clip, inside);
+}
+
+std::size_t level_of_hit(std::span<const FrameParams> frames, const HitRecord &hit) {
+  std::size_t level = 0;
+  while (level + 1 < frames.size() &&
+         level_block_of(&frames[level], hit.block_id) == ISO_INVALID_ID)
+    ++level;
+  return level;
+}
+
+HitRecord among_levels(const FrameParams &frame, HitRecord hit) {
+  const uint x = hit.block_id % frame.grid.blocks_x,
+             y = hit.block_id / frame.grid.blocks_x % frame.grid.blocks_y,
+             z = hit.block_id / frame.grid.blocks_x / frame.grid.blocks_y;
+  hit.block_id = x + frame.place.blocks_x * (y + frame.place.blocks_y * (frame.place.begin_z + z));
+  return hit;
+}
+
+HitRecord within_level(const FrameParams &frame, HitRecord hit) {
+  hit.block_id = level_block_of(&frame, hit.block_id);
   return hit;
 }
 

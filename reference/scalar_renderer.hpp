@@ -62,18 +62,28 @@ HitRecord trace_scalar_levels(std::span<const FrameParams> frames,
                               std::span<const std::vector<float>> voxels, Solver solver,
                               std::span<const Ray> rays, const ClipParams &clip = {});
 
-/// The crossing of a ray behind a hit that it has, of the same surface, by `bernstein`; no_hit() if
-/// there is none. `ray` has its interval.
-HitRecord trace_scalar_behind(const FrameParams &frame, std::span<const float> voxels,
-                              const Ray &ray, const HitRecord &hit);
+/// The hit of such a ray behind one that it has, of the same surface, by `bernstein`; no_hit() if
+/// there is none.
+HitRecord trace_scalar_behind(std::span<const FrameParams> frames,
+                              std::span<const std::vector<float>> voxels, std::span<const Ray> rays,
+                              const HitRecord &hit, const ClipParams &clip = {});
+
+/// The level of detail that has a hit of such a frame.
+std::size_t level_of_hit(std::span<const FrameParams> frames, const HitRecord &hit);
+/// The hit, with its block's number among those of that level.
+HitRecord within_level(const FrameParams &frame, HitRecord hit);
+/// The same back: with its number among those of all levels.
+HitRecord among_levels(const FrameParams &frame, HitRecord hit);
 
 /// The ray, with the frame's band as its interval.
 Ray in_band(const FrameParams &frame, Ray ray);
 
 /// One ray of render_scalar(): the hit of `ray` (index space; t in units of frame.view.t_scale).
 /// frame: dims, blocks, isovalue and t_scale are used.
+///
+/// clip  of its cap, if the ray is cut_by a plane
 HitRecord trace_scalar(const FrameParams &frame, std::span<const float> voxels, Solver solver,
-                       const Ray &ray);
+                       const Ray &ray, const ClipParams &clip = {});
 
 /// The same ray block by block, as the device's passes see it: each block is entered anew and all
 /// that is known on leaving one is its number. Must give the bits of trace_scalar().

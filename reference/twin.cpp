@@ -62,21 +62,30 @@ std::vector<HitRecord> Twin::render(const Camera &camera, ImageSize size, float 
 
 namespace {
 
-/// All crossings of a ray with a surface, in their order: as many as may be drawn, and one more.
-std::vector<HitRecord> crossings(const FrameParams &frame, const std::vector<float> &voxels,
-                                 const Ray &ray, const ClipParams &clip) {
+/// A surface at all levels of detail.
+using SurfaceFrames = std::vector<FrameParams>;
+
+/// All hits of a ray with a surface, in their order: as many as may be drawn, and one more.
+std::vector<HitRecord> hits_of(const SurfaceFrames &frames,
+                               std::span<const std::vector<float>> voxels,
+                               std::span<const Ray> rays, const ClipParams &clip) {
   std::vector<HitRecord> hits;
-  HitRecord hit = trace_scalar_levels({&frame, 1}, {&voxels, 1}, kDefaultSolver, {&ray, 1}, clip);
+  HitRecord hit = trace_scalar_levels(frames, voxels, kDefaultSolver, rays, clip);
   while (std::isfinite(hit.t) && hits.size() <= ISO_MAX_LAYERS) {
     hits.push_back(hit);
-    hit = trace_scalar_behind(frame, voxels, ray, hit);
+    hit = trace_scalar_behind(frames, voxels, rays, hit, clip);
   }
   return hits;
 }
 
+/// The place of the finest level that draws.
+std::size_t first_drawn(const SurfaceFrames &frames) {
+  return static_cast<std::size_t>(std::ranges::find_if(frames, draws) - frames.begin());
+}
+
 /// A surface that light rays may meet.
 struct Caster {
-  FrameParams frame;
+  SurfaceFrames frames;
   uint surface;
   bool clipped;
 };
@@ -94,30 +103,38 @@ class LayerLight {
  public:
   /// clip          of the surfaces that it clips
   /// any_is_whole  any_is_whole() of the surfaces
-  LayerLight(const LightRays &rays, const VolumeInfo &info, const std::vector<float> &voxels,
+  LayerLight(const LightRays &rays, std::span<const VolumeInfo> levels,
+             std::span<const std::vector<float>> voxels, const SurfaceFrames &frames,
              const ClipParams &clip, bool any_is_whole)
       : rays_(rays),
         clip_(clip),
         any_is_whole_(any_is_whole),
-        params_(make_ambient_params(info, rays.num_ambient)),
+        frames_(frames),
+        first_(first_drawn(frames)),
+        params_(make_ambient_params(levels[first_], rays.num_ambient)),
         directions_(make_light_directions(rays)),
         voxels_(voxels) {}
 
   void add(const Caster &caster) { casters_.push_back(caster); }
 
   /// bounced: sums of all rays.
-  HitLight light_of(const FrameParams &seen, const LayerParams &layers, uint has_map, uint pixel,
+  HitLight light_of(const LayerParams &layers, uint has_map, uint pixel,
                     const HitRecord &hit) const {
     std::array<uchar, 2> counts{};
     HitLight light{1, 1, nothing_bounced()};
     if (is_of_slice(&layers, hit)) return light;
-    const HitRecord placed = placed_hit(&seen, 0, hit);
+    const FrameParams &seen = frames_[first_];
+    const std::size_t level = level_of_hit(frames_, hit);
+    const auto place = [&](const HitRecord &own) {
+      return placed_hit(&frames_[level], static_cast<uint>(level - first_), own);
+    };
+    const HitRecord placed = place(within_level(frames_[level], hit));
     const uint pattern = ambient_pattern(&seen, pixel);
     for (std::uint32_t k = 0; k < rays_.count(); ++k) {
       const GivenRay given = ambient_ray(&seen, &params_, placed, pixel, k,
                                          directions_[k * ISO_AMBIENT_PATTERNS + pattern]);
       if (!is_given(given)) continue;
-      const HitRecord met = nearest_met(seen, given);
+      const HitRecord met = nearest_met(level, given);
       const bool is_shadow = is_shadow_ray(&params_, k);
       if (!std::isfinite(met.t)) {
         uchar &count = counts[is_shadow ? 1 : 0];
@@ -126,9 +143,9 @@ class LayerLight {
         const std::size_t row = rays_.num_ambient + light_row(rays_.num_shadow, k);
         float cosine = 0;
         const GivenRay to_light =
-            bounce_ray(&params_, given, placed_hit(&seen, 0, met),
+            bounce_ray(&params_, given, place(met),
                        directions_[row * ISO_AMBIENT_PATTERNS + pattern], &cosine);
-        if (is_given(to_light) && !std::isfinite(nearest_met(seen, to_light).t))
+        if (is_given(to_light) && !std::isfinite(nearest_met(level, to_light).t))
           light.bounced =
               sum_with(light.bounced, cosine, sent_on(has_map, &layers, surface_of(met)));
       }
@@ -139,7 +156,8 @@ class LayerLight {
   }
 
   /// Makes the sums of all hits their shares, filtered layer by layer.
-  void filter(const FrameParams &seen, const LayerParams &params, LitLayers &layers) const {
+  void filter(const LayerParams &params, LitLayers &layers) const {
+    const FrameParams &seen = frames_[first_];
     for (std::vector<LitHit> &layer : layers) {
       std::vector<GivenRay> places(layer.size());
       for (uint ray = 0; ray < layer.size(); ++ray) {
@@ -159,23 +177,26 @@ class LayerLight {
   }
 
  private:
-  /// The nearest of what a ray meets: surfaces that planes leave whole, then those that they clip.
-  HitRecord nearest_met(const FrameParams &seen, const GivenRay &given) const {
+  /// The nearest of what a ray meets in a level of detail: surfaces that planes leave whole, then
+  /// those that they clip. A ray that enters these at a cap within a surface meets the cap.
+  HitRecord nearest_met(std::size_t level, const GivenRay &given) const {
     static constexpr ClipParams kWhole{};
+    const float t_scale = frames_[level].view.t_scale,
+                voxel = std::ldexp(1.0f, static_cast<int>(level));
     HitRecord nearest = no_hit();
     GivenRay ray = given;
     for (const bool clipped : {false, true}) {
       const ClipParams &clip = clipped ? clip_ : kWhole;
       if (clipped && any_is_whole_) {
-        const float begin = entry_of(&clip, given, 1.0f);
-        ray = ray_from(given, begin);
-        nearest.t = t_from(&seen, nearest.t, begin);
+        const RayEntrance at = entrance_of(&clip, given, voxel);
+        ray = entering(&clip, given, at);
+        nearest.t = t_from(t_scale, nearest.t, at.begin);
       }
       for (const Caster &caster : casters_) {
         if (caster.clipped != clipped) continue;
-        const HitRecord met =
-            trace_scalar(caster.frame, voxels_, kDefaultSolver, make_given_ray(ray));
-        if (met.t < nearest.t && !is_clipped(&clip, ray, 1.0f, met.t / seen.view.t_scale))
+        const HitRecord met = trace_scalar(caster.frames[level], voxels_[level], kDefaultSolver,
+                                           make_given_ray(ray), clip);
+        if (met.t < nearest.t && !is_clipped(&clip, ray, voxel, met.t / t_scale))
           nearest = with_surface(met, caster.surface);
       }
     }
@@ -185,9 +206,11 @@ class LayerLight {
   LightRays rays_;
   ClipParams clip_;
   bool any_is_whole_;
+  SurfaceFrames frames_;
+  std::size_t first_;  ///< level that draws
   AmbientParams params_;
   std::vector<AmbientDirection> directions_;
-  const std::vector<float> &voxels_;
+  std::span<const std::vector<float>> voxels_;
   std::vector<Caster> casters_;
 };
 
@@ -225,15 +248,37 @@ std::size_t nearest_of(const std::vector<std::vector<HitRecord>> &left) {
   return nearest;
 }
 
-/// The frame of each surface, in that order.
-std::vector<FrameParams> frames_of(const FrameRequest &request, const VolumeInfo &finest,
-                                   const std::vector<std::uint32_t> &order) {
-  std::vector<FrameParams> frames;
+/// The frames of each surface, in that order.
+std::vector<SurfaceFrames> frames_of(const FrameRequest &request,
+                                     std::span<const VolumeInfo> levels, double voxel_pixels,
+                                     const std::vector<std::uint32_t> &order) {
+  std::vector<SurfaceFrames> frames;
   frames.reserve(order.size());
   for (const std::uint32_t surface : order)
-    frames.push_back(make_frame_params(finest, request.camera, *request.size,
-                                       request.surfaces[surface].isovalue));
+    frames.push_back(make_level_frames(levels, request.camera, *request.size,
+                                       request.surfaces[surface].isovalue, voxel_pixels));
   return frames;
+}
+
+/// A ray of the camera at each level, with its interval there.
+std::vector<Ray> rays_of(const SurfaceFrames &frames, const ClipParams *clip, uint pixel) {
+  std::vector<Ray> rays;
+  for (const FrameParams &frame : frames) {
+    rays.push_back(in_band(frame, make_ray(&frame, pixel)));
+    if (clip != nullptr) clip_ray(&frame, clip, pixel, &rays.back());
+  }
+  return rays;
+}
+
+/// A ray's hit on a slice: the voxels of the level in whose band it lies show.
+HitRecord hit_on_slice(const SurfaceFrames &frames, const ClipParams &clip,
+                       const LayerParams &layers, uint slice, uint pixel) {
+  for (const FrameParams &frame : frames) {
+    if (!draws(frame)) continue;
+    const HitRecord hit = slice_hit(&frame, &clip, &layers, slice, pixel);
+    if (std::isfinite(hit.t)) return among_levels(frame, hit);
+  }
+  return no_hit();
 }
 
 }  // namespace
@@ -244,19 +289,21 @@ LayeredFrame Twin::render_layers(const FrameRequest &request, const FieldTwin *f
   check_surfaces(surfaces, request.slices);
   const std::vector<std::uint32_t> order = innermost_first(surfaces);
   const VolumeInfo &finest = levels_[0];
-  const std::vector<FrameParams> frames = frames_of(request, finest, order);
-  const ClipParams clip = make_clip_params(finest, frames[0].view, request.camera, request.clip);
+  const std::vector<SurfaceFrames> frames = frames_of(request, levels_, voxel_pixels_, order);
+  const SurfaceFrames &levels = frames[0];
+  const ClipParams clip = make_clip_params(finest, levels[0].view, request.camera, request.clip),
+                   whole{};
   const bool has_field = field != nullptr && request.field_values;
   const Shading shading =
       make_layer_shading(finest, request, has_field ? field->volume_range() : std::nullopt);
   const LayerParams colors =
-      make_layer_params(surfaces, request.slices, finest, frames[0].view, request.camera);
-  LayerLight lights(light_rays, finest, voxels_[0], clip, any_is_whole(surfaces));
+      make_layer_params(surfaces, request.slices, finest, levels[0].view, request.camera);
+  LayerLight lights(light_rays, levels_, voxels_, levels, clip, any_is_whole(surfaces));
   for (std::size_t k = 0; k < order.size(); ++k) {
     const SurfaceStyle &surface = surfaces[order[k]];
     if (surface.opacity == 1) lights.add({frames[k], order[k], surface.clipped});
   }
-  const FieldReading of_slices{make_field_map({&finest, 1}, finest)};
+  const std::vector<FieldMap> of_slices = make_own_maps(levels_);
   const uint num_slices = colors.slices.num_planes;
   const std::size_t num_rays = request.size->num_rays();
   LayeredFrame result;
@@ -265,19 +312,24 @@ LayeredFrame Twin::render_layers(const FrameRequest &request, const FieldTwin *f
   result.colors.assign(num_rays, clear_ray());
   std::vector<uchar> cut(num_rays);
   LitLayers lit(light_rays.bounces ? ISO_MAX_LAYERS : 0, std::vector<LitHit>(num_rays));
+  const auto value_of = [&](const HitRecord &hit) {
+    if (is_of_slice(&colors, hit)) {
+      const std::size_t level = level_of_hit(levels, hit);
+      return value_at_hit({of_slices[level]}, levels_[level].dims, voxels_[level], hit);
+    }
+    return has_field ? field->values(levels_, {&hit, 1}, request)[0] : no_value();
+  };
   parallel_for(num_rays, 0, [&](std::uint64_t i, std::uint32_t) {
     const auto pixel = static_cast<uint>(i);
     std::vector<std::vector<HitRecord>> left;  // [slice, then surface] in their order
     for (uint slice = 0; slice < num_slices; ++slice) {
-      const HitRecord hit = slice_hit(frames.data(), &clip, &colors, slice, pixel);
+      const HitRecord hit = hit_on_slice(levels, clip, colors, slice, pixel);
       left.emplace_back(std::isfinite(hit.t) ? 1 : 0, hit);
     }
     for (std::size_t k = 0; k < frames.size(); ++k) {
-      const FrameParams &frame = frames[k];
-      Ray ray = in_band(frame, make_ray(&frame, pixel));
       const bool clips = surfaces[order[k]].clipped;
-      if (clips) clip_ray(&frame, &clip, pixel, &ray);
-      left.push_back(crossings(frame, voxels_[0], ray, clips ? clip : ClipParams{}));
+      left.push_back(hits_of(frames[k], voxels_, rays_of(frames[k], clips ? &clip : nullptr, pixel),
+                             clips ? clip : whole));
       std::ranges::reverse(left.back());
       for (HitRecord &hit : left.back()) hit = with_surface(hit, order[k]);
     }
@@ -291,25 +343,20 @@ LayeredFrame Twin::render_layers(const FrameRequest &request, const FieldTwin *f
       }
       HitRecord hit = left[nearest].back();
       left[nearest].pop_back();
-      if (request.normals == Normals::kSmooth) smooth_gradients(frames[0], voxels_[0], {&hit, 1});
-      float value = no_value();
-      if (is_of_slice(&colors, hit)) {
-        value = value_at_hit(of_slices, finest.dims, voxels_[0], hit);
-      } else if (has_field) {
-        value = field->values({&finest, 1}, {&hit, 1}, request)[0];
-      }
+      if (request.normals == Normals::kSmooth) smooth_gradients(levels, voxels_, {&hit, 1}, 1);
+      const float value = value_of(hit);
       if (is_unseen(&colors, hit, value)) continue;
       result.layers[layer][i] = hit;
       if (!std::isfinite(result.first_hits[i].t)) result.first_hits[i] = hit;
-      const HitLight light = lights.light_of(frames[0], colors, shading.params.has_map, pixel, hit);
+      const HitLight light = lights.light_of(colors, shading.params.has_map, pixel, hit);
       if (light_rays.bounces) lit[layer][i] = {hit, value, light};
-      color = blend_hit(frames.data(), &shading.params, shading.color_map.data(), &colors, pixel,
+      color = blend_hit(levels.data(), &shading.params, shading.color_map.data(), &colors, pixel,
                         hit, value, light, color);
     }
   });
   if (light_rays.bounces) {
-    lights.filter(frames[0], colors, lit);
-    result.colors = blended(frames[0], shading, colors, lit);
+    lights.filter(colors, lit);
+    result.colors = blended(levels[0], shading, colors, lit);
   }
   result.stats = stats_of(result.layers);
   result.stats.rays_cut = static_cast<std::uint64_t>(std::ranges::count(cut, 1));

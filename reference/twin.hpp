@@ -45,8 +45,8 @@ class Twin {
                   const std::vector<HitRecord> &hits, const LightRays &rays,
                   Solver solver = kDefaultSolver, const Clip &clip = {}) const;
 
-  /// The layers that a renderer must find and blend, bit for bit, of the finest level of detail.
-  /// Finds all crossings of each ray with each surface before it merges them.
+  /// The layers that a renderer must find and blend, bit for bit. Finds all hits of each ray with
+  /// each surface before it merges them.
   ///
   /// request  has surfaces and a size
   /// field    for its field_values

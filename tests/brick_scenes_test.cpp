@@ -4,10 +4,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/frame/labels.hpp"
 #include "core/view/color_maps.hpp"
+#include "core/view/detail.hpp"
 #include "tests/brick_team.hpp"
 #include "tests/field_scene.hpp"
 
@@ -122,6 +124,36 @@ TEST_P(BrickScenesOnDevice, SlicesBesideASurface) {
     EXPECT_LT(opaque.layers.hits, whole.layers.hits);
     request_.ambient_rays = 0;
   }
+}
+
+/// Several levels of detail draw surfaces and slices, and their light rays go through all bricks in
+/// the level of their hit.
+TEST_P(BrickScenesOnDevice, LevelsOfDetail) {
+  ArrayReader reader(test::grid_info({41, 37, 33}),
+                     test::sample({41, 37, 33}, test::gyroid_field(9)));
+  const CompressedVolume volume = compress(reader, {.rate = 12, .levels = 3});
+  request_.size = kFrame;
+  request_.camera = orbit_cameras(volume.info, 3)[1];
+  request_.surfaces = {{-0.3f, {0.9f, 0.2f, 0.1f}, 0.4f},
+                       {0.2f, {0.2f, 0.4f, 0.9f}, 1},
+                       {0.5f, {0.8f, 0.8f, 0.3f}, 1, false}};
+  request_.clip = {{{{0.3, 1, 0.2}, 12}}, true};
+  RendererOptions options{.with_levels = true, .max_surfaces = 3, .with_bounce = true};
+  request_.ambient_rays = 1;
+  request_.shadow_rays = 1;
+  request_.light.towards_light = glm::dvec3(0.5, 1, -0.3);
+  request_.bounce_rays = 1;
+  const Shown finest = expect_of_one(volume, nullptr, options, request_);
+  request_.voxel_pixels = 0.8;
+  const auto frames = make_level_frames(level_infos(volume, true), request_.camera, kFrame, 0, 0.8);
+  EXPECT_GT(std::ranges::count_if(frames, draws), 1);
+  const Shown lit = expect_of_one(volume, nullptr, options, request_);
+  EXPECT_NE(lit.picture.pixels, finest.picture.pixels);
+  request_.ambient_rays = request_.shadow_rays = request_.bounce_rays = 0;
+  request_.surfaces = {{0.2f, {0.2f, 0.4f, 0.9f}, 0.3f}, {-0.5f, {0.2f, 0.9f, 0.4f}, 0.3f}};
+  request_.slices = kSlices;
+  const Shown sliced = expect_of_one(volume, nullptr, options, request_);
+  EXPECT_GT(sliced.layers.layers, 6u);
 }
 
 /// Nothing is seen of hits there, and rays go on behind them.

@@ -60,8 +60,8 @@ class BrickTeam : public testing::TestWithParam<ocl::DeviceInfo> {
   ///        fields
   void on_ranks(std::uint32_t size, const CompressedVolume &volume, const CompressedVolume *field,
                 const RendererOptions &options, const Work &work) {
-    const Cuts cuts(blocks_along(volume.info), size);
-    const std::vector<VolumeInfo> whole{volume.info};
+    const std::vector<VolumeInfo> whole = level_infos(volume, options.with_levels);
+    const Cuts cuts(blocks_along(volume.info), size, num_blocks, cut_unit(whole.size()));
     ThreadMeeting meeting(size);
     std::vector<std::jthread> threads;
     for (std::uint32_t rank = 0; rank < size; ++rank) {
@@ -69,7 +69,7 @@ class BrickTeam : public testing::TestWithParam<ocl::DeviceInfo> {
         ThreadTeam team(meeting, rank);
         ocl::Device device(GetParam());
         const BlockBox &own = cuts.bricks()[rank];
-        const CompressedVolume brick = cut_brick(volume, own);
+        const CompressedVolume brick = cut_brick(volume, own, whole.size());
         CompressedVolume other;
         RendererOptions of_rank = options;
         if (field == &volume) of_rank.field = &brick;

@@ -73,7 +73,7 @@ TEST(CliSliceOptions, WhatIsNoSliceIsRefused) {
   std::string eight;
   for (int i = 0; i < 8; ++i) eight += " --slice z";
   refuse(eight, "1 surfaces and 8 slices are more than a frame can have");
-  for (const char *option : {"--voxel-pixels 1", "--max-image-error 0.1", "--time-budget 9"})
+  for (const char *option : {"--max-image-error 0.1", "--time-budget 9"})
     refuse("--slice z " + std::string(option), "--slice draws without it: leave out either");
   refuse("--slice z --pipeline blocks", "--slice: --pipeline blocks draws one opaque surface");
   refuse("--slice z --solver linear", "--slice: needs --solver bernstein");

@@ -250,7 +250,7 @@ TEST(CliSurfaceOptions, WhatDrawsOneSurfaceRefusesThem) {
   const std::string render = "render " + kSphere + "--size 16x12 --surface 0.5,,0.5 ";
   expect_one_line_error(render + "-i 0.5", "--isovalue: draws pictures of one surface each");
   expect_one_line_error(render + "--color red", "--color: surfaces have colours of their own");
-  for (const char *option : {"--voxel-pixels 1", "--max-image-error 0.1", "--time-budget 9"})
+  for (const char *option : {"--max-image-error 0.1", "--time-budget 9"})
     expect_one_line_error(render + option, "--surface draws without it: leave it out");
   for (const char *option : {"--ambient 2", "--light 1,0,0 --shadow 1", "--light 1,0,0 --bounce 1"})
     expect_one_line_error(render + option, "end at surfaces of opacity 1, and there is none");

@@ -292,7 +292,13 @@ TEST(Entering, ARayThatBeginsBehindPlanes) {
                                              {{{{1, 0, 0}, 8}, {{-1, 0, 0}, -12}, {{0, 2, 0}, 2}}});
   // What is left: x from 8 to 12, y from 1 on.
   const auto entered = [&](const GivenRay &given, float voxel = 1) {
-    return entering(&params, given, voxel);
+    const RayEntrance at = entrance_of(&params, given, voxel);
+    GivenRay ray = entering(&params, given, at);
+    EXPECT_EQ(level_of_given(ray), given.level);
+    EXPECT_EQ(cut_of_given(ray), at.plane);
+    EXPECT_EQ(at.plane == ISO_NOT_CUT, at.begin == 0);
+    ray.level = given.level;
+    return ray;
   };
   const GivenRay within{9, 2, 2, 1, -1, 0.5f, 0};
   const GivenRay same = entered(within);
@@ -301,6 +307,10 @@ TEST(Entering, ARayThatBeginsBehindPlanes) {
   EXPECT_FLOAT_EQ(from_x.o_x, 8);
   EXPECT_FLOAT_EQ(from_x.o_z, 4);
   expect_left_at(params, from_x, 1, 2);
+  EXPECT_EQ(entrance_of(&params, {4, 2, 2, 2, 0, 1, 0}, 1).plane, 0);
+  ClipParams open = params;
+  open.with_caps = 0;
+  EXPECT_EQ(entering(&open, within, {1, 2}).level, within.level) << "there is no cap";
   const GivenRay from_both = entered({7, -2, 2, 1, 1, 0, 0});
   EXPECT_FLOAT_EQ(from_both.o_x, 10);
   EXPECT_FLOAT_EQ(from_both.o_y, 1);

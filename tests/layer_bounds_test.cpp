@@ -211,6 +211,32 @@ TEST(LayerBounds, AreKeptInRandomScenes) {
   expect_kept(sum, 8);
 }
 
+/// Coarser levels are further off. Their slices are where those of the finest level are.
+TEST(LayerBounds, AreKeptAtLevelsOfDetail) {
+  const BoundsScene scene({36, 33, 39}, test::gyroid_field(21), {.rate = 12});
+  HostRenderer renderer(scene.volume);
+  BoundTally sum;
+  std::uint64_t num_on_slices = 0;
+  for (const Camera &camera : some_cameras(scene.volume.info)) {
+    FrameRequest request{.camera = camera, .size = kSize};
+    request.surfaces = surfaces_at(std::array{0.2f, 0.9f});
+    request.slices = slices_of(scene.volume.info);
+    for (const double voxel_pixels : {2.0, 6.0}) {
+      request.voxel_pixels = voxel_pixels;
+      const Judged judged = judge(renderer, scene, request);
+      add(sum, judged.tally);
+      for (std::size_t ray = 0; ray < judged.drawn.size(); ++ray) {
+        const HitRecord &hit = judged.drawn[ray];
+        num_on_slices +=
+            std::isfinite(hit.t) && surface_of(hit) >= 2 && judged.certificate.bounds[ray] < 1e-3f;
+      }
+    }
+  }
+  EXPECT_EQ(sum.exceeded, 0u);
+  EXPECT_GT(sum.hits, 1000u);
+  EXPECT_GT(num_on_slices, 500u);
+}
+
 /// Slices are where they are drawn, and hide what is uncertain behind them.
 TEST(LayerBounds, AreKeptBesideSlices) {
   const BoundsScene scene({36, 33, 39}, test::gyroid_field(14), {.rate = 7});
@@ -325,7 +351,7 @@ TEST(LayerBounds, ErrorsOfLabelsAndOfClippedSurfacesAreRefused) {
   refuse("errors are proven of whole surfaces", [](FrameRequest &r) {
     r.clip = {{{{1, 0, 0}, 5}}};
   });
-  refuse("without voxel_pixels: leave out voxel_pixels",
+  refuse("max_surface_error chooses the detail: leave out voxel_pixels",
          [](FrameRequest &r) { r.voxel_pixels = 1; });
   refuse("without max_image_error: leave out max_image_error", [](FrameRequest &r) {
     r.max_surface_error.reset();

@@ -62,6 +62,13 @@ VolumeCase of_volume(const char *name, CompressedVolume volume, float middle, fl
           surfaces_at(eight, {0.2f, 0.45f, 0.1f, 0.8f, 0.05f})};
 }
 
+/// With levels of detail.
+VolumeCase pyramid() {
+  const glm::uvec3 dims(33, 29, 38);
+  ArrayReader gyroid(test::grid_info(dims), test::sample(dims, test::gyroid_field(12)));
+  return of_volume("pyramid", compress(gyroid, {.rate = 14, .levels = 0}), 0.1f, 0.3f);
+}
+
 std::vector<VolumeCase> volumes() {
   std::vector<VolumeCase> cases;
   VolumeInfo placed = test::grid_info({33, 29, 38}, {1, 1.3, 0.8});
@@ -275,12 +282,17 @@ TEST(LayersOnTheHost, OneOpaqueSurfaceIsThePlainPicture) {
 
 /// The loops for any processor, and for this one.
 TEST(LayersOnTheHost, AllLoopsGiveTheSameBits) {
-  for (const VolumeCase &of : volumes()) {
+  std::vector<VolumeCase> all_volumes = volumes();
+  all_volumes.push_back(pyramid());
+  for (const VolumeCase &of : all_volumes) {
     HostLevels levels(of.volume, HostRoom::kNoLimit, 0);
-    const Twin twin(of.volume);
+    const double pixels = of.volume.coarser_levels.empty() ? 0 : 1.5;
+    const Twin twin(of.volume, pixels);
     const VolumeInfo &info = of.volume.info;
     const Camera camera = cameras_of(info)[2];
-    const FrameParams frame = make_frame_params(info, camera, kSize, 0);
+    const auto frames = make_level_frames(levels.infos(), camera, kSize, 0, pixels);
+    EXPECT_EQ(std::ranges::count_if(frames, draws) > 1, pixels != 0);
+    const FrameParams &frame = frames.front();
     for (const Clip &clip_by : clips_of(info)) {
       const LayeredFrame expected = twin.render_layers({.camera = camera,
                                                         .size = kSize,
@@ -291,11 +303,14 @@ TEST(LayersOnTheHost, AllLoopsGiveTheSameBits) {
       const LayerBlend by{.shading = make_shade_params(info, light()),
                           .colors = make_layer_params(of.three, {}, info, frame.view, camera),
                           .numbers = innermost_first(of.three),
-                          .clip = clip};
+                          .clip = clip,
+                          .finest = &frame};
       std::vector<float> isovalues;
       for (const std::uint32_t number : by.numbers) isovalues.push_back(of.three[number].isovalue);
-      std::vector<HostLevel> surfaces = levels.open_surfaces(frame, isovalues, 0);
-      for (HostLevel &surface : surfaces) surface.clip = clip_by.planes.empty() ? nullptr : &clip;
+      std::vector<LeveledSurface> surfaces = levels.open_surfaces(frames, isovalues, 0);
+      for (LeveledSurface &surface : surfaces) {
+        for (HostLevel &level : surface) level.clip = clip_by.planes.empty() ? nullptr : &clip;
+      }
       const RayTile all{0, 0, kSize.width, kSize.height};
       for (const HostLoops &loops : all_host_loops()) {
         for (const bool by_rays : {false, true}) {
@@ -305,7 +320,7 @@ TEST(LayersOnTheHost, AllLoopsGiveTheSameBits) {
           std::vector<HitRecord> next(kSize.num_rays() * surfaces.size());
           for (std::size_t k = 0; k < surfaces.size(); ++k) {
             std::vector<HitRecord> of_one(kSize.num_rays(), no_hit());
-            trace({&surfaces[k], 1}, all, false, of_one.data());
+            trace(surfaces[k], all, false, of_one.data());
             for (std::size_t i = 0; i < of_one.size(); ++i)
               next[k + surfaces.size() * i] = of_one[i];
           }
@@ -499,7 +514,8 @@ TEST(LayersOnTheHost, RefusesInOneLine) {
   expect_refusal(
       [](FrameRequest &request) { request.surfaces[2].isovalue = request.surfaces[0].isovalue; },
       "two surfaces have the isovalue 0.1");
-  expect_refusal([](FrameRequest &request) { request.voxel_pixels = 1; }, "leave out voxel_pixels");
+  expect_refusal([](FrameRequest &request) { request.voxel_pixels = 1; },
+                 "leave out voxel_pixels, or draw");
   expect_refusal(
       [](FrameRequest &request) {
         request.ambient_rays = 2;

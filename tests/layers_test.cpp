@@ -217,6 +217,43 @@ TEST_P(LayersOnDevice, OneOpaqueSurfaceIsThePlainPicture) {
   }
 }
 
+/// The surface is in blocks far behind the cap: a ray that goes on there begins outside their box.
+TEST_P(LayersOnDevice, GoesOnFarBehindACap) {
+  const VolumeInfo info = test::grid_info({64, 14, 15});
+  const auto volume =
+      compressed(info, test::sample(info.dims, [](const glm::dvec3 &at) { return 50.3 - at.x; }));
+  constexpr ImageSize kFew{12, 10};
+  DeviceRenderer renderer(device_, volume, {.size = kFew, .max_surfaces = 1});
+  TwinRenderer twin(volume, kFew);
+  FrameRequest request{.camera = test::camera_along({-9, 6.6, 7.3}, {1, 0.02, 0.03})};
+  request.surfaces = {{0, {0.8f, 0.2f, 0.1f}, 0.3f}};
+  request.clip = {{{{1, 0, 0}, 5.5}}};
+  twin.render(request);
+  const FrameStats stats = renderer.render(request);
+  EXPECT_EQ(stats.layers.layers, 2u);
+  expect_same_hits(renderer.hits(), twin.hits(), kFew.width);
+  EXPECT_EQ(renderer.shade().pixels, twin.shade().pixels);
+}
+
+/// The rays that may hit the first surface, which planes leave whole, are few.
+TEST_P(LayersOnDevice, AClippedSurfaceAroundAWholeOne) {
+  const VolumeInfo info = test::grid_info({60, 60, 60});
+  const auto volume = compressed(info, test::sample(info.dims, [](const glm::dvec3 &at) {
+                                   return -glm::length(at - glm::dvec3(29.5));
+                                 }));
+  constexpr ImageSize kWide{64, 48};
+  DeviceRenderer renderer(device_, volume, {.size = kWide, .max_surfaces = 2});
+  TwinRenderer twin(volume, kWide);
+  FrameRequest request{.camera = test::camera_along({29, 31, -20}, {0, 0, 1})};
+  request.surfaces = {{-27, {0.8f, 0.2f, 0.1f}, 1}, {-4, {0.1f, 0.9f, 0.1f}, 1, false}};
+  request.clip = {{{{0, 0, 1}, 28.5}}};
+  twin.render(request);
+  const FrameStats stats = renderer.render(request);
+  EXPECT_GT(stats.rays_hit, kWide.num_rays() / 2);
+  expect_same_hits(renderer.hits(), twin.hits(), kWide.width);
+  EXPECT_EQ(renderer.shade().pixels, twin.shade().pixels);
+}
+
 /// Pictures during a frame change nothing, and a frame that is stopped has one, too.
 TEST_P(LayersOnDevice, StopsWithThePictureSoFar) {
   const CompressedVolume volume = gyroid();

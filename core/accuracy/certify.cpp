@@ -287,7 +287,9 @@ struct SlicesOfFrame {
   SlicesOfFrame(const FrameRequest &request, const VolumeInfo &finest, const FrameParams &of)
       : frame(of),
         layers(
-            make_layer_params(request.surfaces, request.slices, finest, of.view, request.camera)) {}
+            make_layer_params(request.surfaces, request.slices, finest, of.view, request.camera)) {
+    frame.band = {.begin_t = 0, .end_t = INFINITY};  // all levels have a slice at the same t
+  }
 
   /// Adds a ray's hits with slices. If the volume lacks voxels, the drawn hit alone is known to be
   /// seen: that of a slice, if no surface can be there.
@@ -309,7 +311,7 @@ struct SlicesOfFrame {
     }
   }
 
-  const FrameParams &frame;
+  FrameParams frame;  ///< of the finest level
   LayerParams layers;
 };
 

@@ -27,7 +27,7 @@ struct SentHit {
   float grad_x, grad_y, grad_z;
   float value;    ///< RayHit::value
   float x, y, z;  ///< of a placed_hit(); sent if light rays begin there
-  float unused;
+  uint level;     ///< its level of detail
 };
 /// SentHit, as far as it is sent.
 constexpr std::size_t kBlendedWords = 2, kPlacedWords = 4;
@@ -192,8 +192,9 @@ class TeamRenderer::Layering {
       if (words_[ray] == HitOrder::kNone || words_[ray] != own_words_[ray]) continue;
       const RayHit &own = *own_.next(ray);
       const HitRecord placed = of_.renderer_.placed(own.hit);
-      hits[ray] = std::bit_cast<SentWords>(SentHit{own.hit.grad_x, own.hit.grad_y, own.hit.grad_z,
-                                                   own.value, placed.x, placed.y, placed.z, 0});
+      hits[ray] =
+          std::bit_cast<SentWords>(SentHit{own.hit.grad_x, own.hit.grad_y, own.hit.grad_z,
+                                           own.value, placed.x, placed.y, placed.z, placed.cell});
       if (HitOrder::is_seen(words_[ray]) && !has_hit_[ray]) first_hits_[ray] = own.hit;
       own_.take(ray);
     }
@@ -224,9 +225,10 @@ class TeamRenderer::Layering {
       placed[ray].x = hit.x;
       placed[ray].y = hit.y;
       placed[ray].z = hit.z;
-      placed[ray].cell = 0;  // the finest level of detail
+      placed[ray].cell = hit.level;
     }
-    together(of_.team_, [&] { of_.renderer_.begin_ambient(request_, placed, {0, 1}); });
+    together(of_.team_,
+             [&] { of_.renderer_.begin_ambient(request_, placed, of_.drawn_levels(request_)); });
     const LightRays light_rays = light_rays_of(request_);
     const SentOn sent_on = [this](std::uint32_t surface) {
       return isowave::core::sent_on(shading_.params.has_map, &params_, surface);

@@ -294,7 +294,7 @@ std::vector<HitRecord> TeamRenderer::compose_nearest(const FrameRequest &request
     std::copy_n(parts.begin() + std::ptrdiff_t(kWords * ray), kWords, part.begin());
     const auto values = std::bit_cast<std::array<float, 2 * kWords>>(part);
     hit.t = value_of_key(static_cast<std::uint32_t>(words[ray] >> 32));
-    hit.cell = 0;  // the finest level of detail
+    hit.cell = level_of_given(rays[ray]);
     hit.x = values[0];
     hit.y = values[1];
     hit.z = values[2];

@@ -29,6 +29,18 @@ FieldMap make_field_map(std::span<const VolumeInfo> levels, const VolumeInfo &fi
   return map;
 }
 
+std::vector<FieldMap> make_own_maps(std::span<const VolumeInfo> levels) {
+  std::vector<FieldMap> maps;
+  const std::vector<FrameParams> grids = make_level_grids(levels);
+  for (std::size_t level = 0; level < levels.size(); ++level) {
+    FieldMap &map = maps.emplace_back(make_field_map(levels.subspan(level, 1), levels[level]));
+    map.blocks_x = grids[level].place.blocks_x;
+    map.blocks_y = grids[level].place.blocks_y;
+    map.begin_z[0] = grids[level].place.begin_z;
+  }
+  return maps;
+}
+
 FieldReading reading_of(const FrameRequest &request, const FieldMap &map, bool is_own) {
   FieldReading reading{map};
   reading.map.caps_alone = request.field_on_caps ? 1 : 0;

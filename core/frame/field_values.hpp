@@ -4,6 +4,7 @@
 #include <array>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "core/frame/appearance.hpp"
 #include "core/frame/frame_request.hpp"
@@ -17,6 +18,10 @@ namespace isowave::core {
 /// levels  of detail that may have hits, the finest first
 /// Throws  Error: a volume's directions do not span space
 FieldMap make_field_map(std::span<const VolumeInfo> levels, const VolumeInfo &field);
+
+/// [level] From hits in a level of detail to the voxels of that level. Arguments as
+/// make_field_map().
+std::vector<FieldMap> make_own_maps(std::span<const VolumeInfo> levels);
 
 /// Whether the frame has blocks of the finest level decoded to the volume's own values, which a
 /// field has.

@@ -33,7 +33,7 @@ void check_choices(const FrameRequest &request) {
     };
     leave_out(has_labels && request.voxel_error != 0, "voxel_error");
     leave_out(request.bound != FieldBound::kNone, "bound");
-    leave_out(request.voxel_pixels != 0, "voxel_pixels");
+    leave_out(has_labels && request.voxel_pixels != 0, "voxel_pixels");
     leave_out(has_labels && request.max_surface_error, "max_surface_error");
     leave_out(request.max_image_error.has_value(), "max_image_error");
     leave_out(request.time_budget_ms.has_value(), "time_budget_ms");

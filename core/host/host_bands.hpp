@@ -48,15 +48,17 @@ __attribute__((noinline)) inline HitRecord hit_at_border(const HostLevel &level,
   open_cell(level, cell, w);
   HitRecord hit = make_hit(&level.frame, &ray, w, x, y, z, border_event(ray.begin_t),
                            passes_border(exit, ray.end_t) ? border_event(ray.end_t) : exit, 0.0f);
-  if (begins_at_cap(level.clip, &ray)) cap_hit(level.clip, &ray, &hit);
+  mark_beginning(level.clip, &ray, &hit);
   return hit;
 }
 
 /// The first hit of a ray, from band to band. If two levels have it on different sides of the
 /// surface, it hits at their border; if it is inside where it is cut, it hits there.
+///
+/// before  the side on which the ray comes to the first of the levels
 template <auto kTraceRay, auto kSide>
-inline bool trace_bands(std::span<const HostLevel> levels, uint ray_id, HitRecord *hit) {
-  uint before = ISO_SIDE_UNKNOWN;
+inline bool trace_bands(std::span<const HostLevel> levels, uint ray_id, HitRecord *hit,
+                        uint before = ISO_SIDE_UNKNOWN) {
   for (const HostLevel &level : levels) {
     const LastPlanes last = last_planes(&level.frame);
     const Ray ray = ray_of_level(level, ray_id);
@@ -107,12 +109,16 @@ inline uint trace_rays_of_levels(std::span<const HostLevel> levels, const RayTil
 /// Eight rays of a frame: 4 columns and 2 rows from (x, y) on.
 struct RayPacket {
   uint x, y;
-  uint lanes;       ///< bit column + 4 row: the rays that have no hit yet
-  uchar before[8];  ///< where they were at the end of the last band; of the first, unknown
-  BandSides sides;  ///< of this band
+  uint lanes;            ///< bit column + 4 row: the rays that have no hit yet
+  uchar before[8];       ///< where they were at the end of the last band; of the first, unknown
+  BandSides sides;       ///< of this band
+  bool by_lane = false;  ///< hits are [8], instead of those of all rays
 
   uint ray_id(const FrameParams &frame, uint lane) const {
     return x + lane % 4 + frame.view.width * (y + lane / 4);
+  }
+  uint place(const FrameParams &frame, uint lane) const {
+    return by_lane ? lane : ray_id(frame, lane);
   }
 };
 
@@ -132,7 +138,7 @@ inline uint hit_at_borders(const HostLevel &level, const RayPacket &packet, HitR
     BlockCoords cell;
     const uint side = kSide(level, ray, last, ray.begin_t, &cell);
     if (side == ISO_SIDE_UNKNOWN || side == before) continue;
-    hits[ray_id] = hit_at_border(level, ray, last, cell);
+    hits[packet.place(level.frame, lane)] = hit_at_border(level, ray, last, cell);
     found |= 1u << lane;
   }
   return found;
@@ -152,6 +158,27 @@ inline void end_band(const HostLevel &level, RayPacket &packet) {
   }
 }
 
+/// Traces a packet from the first of the levels on.
+///
+/// hits     packet.place()
+/// Returns  number of hits
+template <auto kTraceBand, auto kSide>
+inline uint trace_packet_bands(std::span<const HostLevel> levels, bool begins, RayPacket &packet,
+                               HitRecord *hits) {
+  uint num_hits = 0;
+  for (const HostLevel &level : levels) {
+    uint found =
+        kTraceBand(level, packet.x, packet.y, packet.lanes, hits, packet.by_lane, &packet.sides);
+    if (!begins || &level != levels.data() || level.clip != nullptr)
+      found |= hit_at_borders<kSide>(level, packet, hits);
+    num_hits += static_cast<uint>(std::popcount(found));
+    packet.lanes &= ~(found | packet.sides.ended);
+    if (packet.lanes == 0) break;
+    if (&level != &levels.back()) end_band<kSide>(level, packet);
+  }
+  return num_hits;
+}
+
 /// trace_rays_of_levels() in packets.
 template <auto kTraceBand, auto kSide>
 inline uint trace_levels(std::span<const HostLevel> levels, const RayTile &tile, HitRecord *hits) {
@@ -160,15 +187,7 @@ inline uint trace_levels(std::span<const HostLevel> levels, const RayTile &tile,
     for (uint x = tile.begin_x; x < tile.end_x; x += 4) {
       const uint columns = tile.end_x - x < 4 ? (1u << (tile.end_x - x)) - 1 : 0xFu;
       RayPacket packet = {x, y, y + 1 < tile.end_y ? columns | columns << 4 : columns, {}, {}};
-      for (const HostLevel &level : levels) {
-        uint found = kTraceBand(level, x, y, packet.lanes, hits, &packet.sides);
-        if (&level != levels.data() || level.clip != nullptr)
-          found |= hit_at_borders<kSide>(level, packet, hits);
-        num_hits += static_cast<uint>(std::popcount(found));
-        packet.lanes &= ~(found | packet.sides.ended);
-        if (packet.lanes == 0) break;
-        if (&level != &levels.back()) end_band<kSide>(level, packet);
-      }
+      num_hits += trace_packet_bands<kTraceBand, kSide>(levels, true, packet, hits);
     }
   }
   return num_hits;

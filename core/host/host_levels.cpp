@@ -8,11 +8,13 @@
 
 namespace isowave::core {
 
-std::uint64_t HostLevels::least_bytes(const CompressedVolume &volume, std::size_t num_surfaces) {
-  std::uint64_t sum =
-      HostBlocks::ray_bytes() + (num_surfaces - 1) * HostBlocks::bytes_per_isovalue(volume.info);
+std::uint64_t HostLevels::least_bytes(const CompressedVolume &volume, std::size_t num_surfaces,
+                                      bool at_levels) {
+  std::uint64_t sum = HostBlocks::ray_bytes();
   for (const CompressedVolume *level : levels_of(volume, true))
     sum += HostBlocks::bytes(level->info);
+  for (const CompressedVolume *level : levels_of(volume, at_levels))
+    sum += (num_surfaces - 1) * HostBlocks::bytes_per_isovalue(level->info);
   return sum;
 }
 
@@ -52,17 +54,23 @@ std::vector<HostLevel> HostLevels::open(std::span<const FrameParams> frames, dou
   return levels;
 }
 
-std::vector<HostLevel> HostLevels::open_surfaces(const FrameParams &frame,
-                                                 std::span<const float> isovalues,
-                                                 double voxel_error) {
-  HostBlocks &blocks = blocks_of(0);
-  blocks.decode_as({*volumes_[0], true, voxel_error, FieldBound::kNone, volumes_[0]->value_range});
-  blocks.select(isovalues);
-  std::vector<HostLevel> surfaces;
-  for (std::size_t i = 0; i < isovalues.size(); ++i) {
-    surfaces.push_back({frame, blocks.field(i)});
-    surfaces.back().frame.surface = blocks.surface(i);
-    surfaces.back().frame.screen = make_screen_box(surfaces.back().frame);
+std::vector<LeveledSurface> HostLevels::open_surfaces(std::span<const FrameParams> frames,
+                                                      std::span<const float> isovalues,
+                                                      double voxel_error) {
+  std::vector<LeveledSurface> surfaces(isovalues.size());
+  for (std::size_t level = 0; level < frames.size(); ++level) {
+    if (!draws(frames[level])) continue;
+    HostBlocks &blocks = blocks_of(level);
+    blocks.decode_as({*volumes_[level], level == 0, voxel_error_of(voxel_error, level),
+                      FieldBound::kNone, volumes_[0]->value_range});
+    blocks.select(isovalues);
+    for (std::size_t i = 0; i < isovalues.size(); ++i) {
+      surfaces[i].push_back({frames[level], blocks.field(i)});
+      surfaces[i].back().frame.surface = blocks.surface(i);
+    }
+  }
+  for (LeveledSurface &surface : surfaces) {
+    if (surface.size() == 1) surface[0].frame.screen = make_screen_box(surface[0].frame);
   }
   return surfaces;
 }
@@ -81,14 +89,14 @@ HostBlocks &HostLevels::blocks_of_labels(std::size_t group, std::span<const std:
   return *label_blocks_[group];
 }
 
-std::vector<HostLevel> HostLevels::open_labels(const FrameParams &frame,
-                                               std::span<const std::vector<std::uint16_t>> groups) {
-  std::vector<HostLevel> surfaces;
+std::vector<LeveledSurface> HostLevels::open_labels(
+    const FrameParams &frame, std::span<const std::vector<std::uint16_t>> groups) {
+  std::vector<LeveledSurface> surfaces;
   for (std::size_t i = 0; i < groups.size(); ++i) {
     HostBlocks &blocks = blocks_of_labels(i, groups[i]);
-    surfaces.push_back({frame, blocks.field()});
-    surfaces.back().frame.surface = blocks.surface();
-    surfaces.back().frame.screen = make_screen_box(surfaces.back().frame);
+    HostLevel &surface = surfaces.emplace_back(1, HostLevel{frame, blocks.field()}).front();
+    surface.frame.surface = blocks.surface();
+    surface.frame.screen = make_screen_box(surface.frame);
   }
   return surfaces;
 }

@@ -18,7 +18,9 @@ class HostLevels {
   /// single ray needs at a time.
   ///
   /// num_surfaces  most of a frame
-  static std::uint64_t least_bytes(const CompressedVolume &volume, std::size_t num_surfaces = 1);
+  /// at_levels     coarser levels may draw several surfaces, too
+  static std::uint64_t least_bytes(const CompressedVolume &volume, std::size_t num_surfaces = 1,
+                                   bool at_levels = false);
 
   /// volume        must outlive this
   /// memory_limit  bound on bytes(); at least least_bytes()
@@ -42,15 +44,15 @@ class HostLevels {
   /// Throws   Error: as HostBlocks and value_offset(); the file contradicts itself
   std::vector<HostLevel> open(std::span<const FrameParams> frames, double voxel_error = 0,
                               FieldBound bound = FieldBound::kNone);
-  /// Prepares the finest level for a frame of several surfaces.
+  /// Prepares the levels that draw a frame of several surfaces.
   ///
-  /// frame        of the finest level
+  /// frames       see make_level_frames()
   /// isovalues    one or more; the limit of the memory is at least least_bytes() of so many
   /// voxel_error  FrameRequest::voxel_error
-  /// Returns  [isovalue] the level with that surface; they stay valid as those of open()
+  /// Returns  [isovalue] as open()
   /// Throws   Error: as HostBlocks
-  std::vector<HostLevel> open_surfaces(const FrameParams &frame, std::span<const float> isovalues,
-                                       double voxel_error);
+  std::vector<LeveledSurface> open_surfaces(std::span<const FrameParams> frames,
+                                            std::span<const float> isovalues, double voxel_error);
   /// Memory of that many groups of labels, beside least_bytes().
   static std::uint64_t bytes_of_labels(const VolumeInfo &info, std::size_t num_groups) {
     return num_groups * HostBlocks::bytes(info);
@@ -62,8 +64,8 @@ class HostLevels {
   /// groups  one or more lists of labels
   /// Returns  [group] as open_surfaces()
   /// Throws   Error: as HostBlocks
-  std::vector<HostLevel> open_labels(const FrameParams &frame,
-                                     std::span<const std::vector<std::uint16_t>> groups);
+  std::vector<LeveledSurface> open_labels(const FrameParams &frame,
+                                          std::span<const std::vector<std::uint16_t>> groups);
   /// The box around the blocks that the surface of labels is in; none if there is no such block.
   std::optional<BlockBox> label_box(std::span<const std::uint16_t> labels);
   /// Prepares the finest level for rays of any origin: its field is that of all bit planes.

@@ -308,17 +308,17 @@ ISO_WHOLE_LOOP void shade_anywhere(const FrameParams &frame, const Shading &shad
 ISO_OF_ITS_OWN ISO_WHOLE_LOOP void smooth_hit_anywhere(const HostLevel &level, HitRecord *hit) {
   smooth_gradient(level.frame, level.field, last_planes(&level.frame), hit);
 }
-ISO_OF_ITS_OWN ISO_WHOLE_LOOP bool trace_ray_behind_anywhere(const HostLevel &surface, uint ray_id,
-                                                             const HitRecord &hit,
+ISO_OF_ITS_OWN ISO_WHOLE_LOOP bool trace_ray_behind_anywhere(std::span<const HostLevel> surface,
+                                                             uint ray_id, const HitRecord &hit,
                                                              HitRecord *next) {
-  return trace_ray_behind<trace_ray_anywhere, trace_ray_in_cell_anywhere, trace_block_anywhere>(
-      surface, ray_id, hit, next);
+  return trace_ray_behind<trace_ray_anywhere, trace_ray_in_cell_anywhere, trace_block_anywhere,
+                          side_anywhere>(surface, ray_id, hit, next);
 }
-ISO_WHOLE_LOOP uint blend_rays_anywhere(std::span<const HostLevel> surfaces, const LayerBlend &by,
-                                        const RayTile &tile, HitRecord *next,
+ISO_WHOLE_LOOP uint blend_rays_anywhere(std::span<const LeveledSurface> surfaces,
+                                        const LayerBlend &by, const RayTile &tile, HitRecord *next,
                                         const LayersOfRays &to) {
   return blend<trace_rays_behind<trace_ray_behind_anywhere>, smooth_hit_anywhere,
-               trace_ray_anywhere>(surfaces, by, tile, next, to);
+               trace_ray_anywhere, side_anywhere>(surfaces, by, tile, next, to);
 }
 ISO_WHOLE_LOOP void blend_lit_anywhere(const FrameParams &frame, const LayerBlend &by,
                                        std::span<const LayerHit> layer, const float *sums,
@@ -404,20 +404,22 @@ ISO_WIDE_LOOP void shade_wide(const FrameParams &frame, const Shading &shading, 
 ISO_OF_ITS_OWN ISO_WIDE_LOOP void smooth_hit_wide(const HostLevel &level, HitRecord *hit) {
   smooth_gradient(level.frame, level.field, last_planes(&level.frame), hit);
 }
-ISO_OF_ITS_OWN ISO_WIDE_LOOP bool trace_ray_behind_wide(const HostLevel &surface, uint ray_id,
-                                                        const HitRecord &hit, HitRecord *next) {
-  return trace_ray_behind<trace_ray_wide, trace_ray_in_cell_wide, trace_block_wide>(surface, ray_id,
-                                                                                    hit, next);
+ISO_OF_ITS_OWN ISO_WIDE_LOOP bool trace_ray_behind_wide(std::span<const HostLevel> surface,
+                                                        uint ray_id, const HitRecord &hit,
+                                                        HitRecord *next) {
+  return trace_ray_behind<trace_ray_wide, trace_ray_in_cell_wide, trace_block_wide, side_wide>(
+      surface, ray_id, hit, next);
 }
-ISO_WIDE_LOOP uint blend_wide(std::span<const HostLevel> surfaces, const LayerBlend &by,
+ISO_WIDE_LOOP uint blend_wide(std::span<const LeveledSurface> surfaces, const LayerBlend &by,
                               const RayTile &tile, HitRecord *next, const LayersOfRays &to) {
-  return blend<trace_packets_behind<trace_ray_in_cell_wide, trace_packet_behind>, smooth_hit_wide,
-               trace_ray_wide>(surfaces, by, tile, next, to);
+  return blend<trace_packets_behind<trace_ray_in_cell_wide, trace_packet_behind, trace_band_packet,
+                                    side_wide>,
+               smooth_hit_wide, trace_ray_wide, side_wide>(surfaces, by, tile, next, to);
 }
-ISO_WIDE_LOOP uint blend_rays_wide(std::span<const HostLevel> surfaces, const LayerBlend &by,
+ISO_WIDE_LOOP uint blend_rays_wide(std::span<const LeveledSurface> surfaces, const LayerBlend &by,
                                    const RayTile &tile, HitRecord *next, const LayersOfRays &to) {
-  return blend<trace_rays_behind<trace_ray_behind_wide>, smooth_hit_wide, trace_ray_wide>(
-      surfaces, by, tile, next, to);
+  return blend<trace_rays_behind<trace_ray_behind_wide>, smooth_hit_wide, trace_ray_wide,
+               side_wide>(surfaces, by, tile, next, to);
 }
 ISO_WIDE_LOOP void blend_lit_wide(const FrameParams &frame, const LayerBlend &by,
                                   std::span<const LayerHit> layer, const float *sums,
@@ -442,10 +444,12 @@ uint trace_levels_sse4(std::span<const HostLevel> levels, const RayTile &tile, b
       trace_levels<trace_band_packet_sse4, side_anywhere>(levels, tile, hits), levels, tile,
       is_smooth, hits);
 }
-uint blend_sse4(std::span<const HostLevel> surfaces, const LayerBlend &by, const RayTile &tile,
+uint blend_sse4(std::span<const LeveledSurface> surfaces, const LayerBlend &by, const RayTile &tile,
                 HitRecord *next, const LayersOfRays &to) {
-  return blend<trace_packets_behind<trace_ray_in_cell_anywhere, trace_packet_behind_sse4>,
-               smooth_hit_anywhere, trace_ray_anywhere>(surfaces, by, tile, next, to);
+  return blend<trace_packets_behind<trace_ray_in_cell_anywhere, trace_packet_behind_sse4,
+                                    trace_band_packet_sse4, side_anywhere>,
+               smooth_hit_anywhere, trace_ray_anywhere, side_anywhere>(surfaces, by, tile, next,
+                                                                       to);
 }
 
 /// With fused multiply-add, single rays are faster.

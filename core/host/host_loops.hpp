@@ -132,13 +132,17 @@ struct LayerBlend {
   std::vector<std::uint32_t> numbers{};    ///< innermost_first()
   bool is_smooth = true;                   ///< Normals::kSmooth
   ClipParams clip{};                       ///< of slices, and of surfaces that are clipped
-  FieldMap slice_map{};                    ///< from hits on slices to the volume
+  const FrameParams *finest = nullptr;     ///< for shading; this level need not draw
+  std::vector<FieldMap> slice_maps{};      ///< [level that draws] from hits on slices to its voxels
   const HostFieldValues *field = nullptr;  ///< for colours of the surfaces; null: none
-  AmbientRays rays{};                      ///< of the hits of each layer
+  AmbientRays rays{};                      ///< of the hits of each layer: level is 0
   /// The surfaces that such rays may meet: those that clipping planes leave whole, and the others.
   std::array<std::vector<std::size_t>, 2> opaque{};
   bool any_is_whole = false;  ///< of all surfaces
 };
+
+/// A surface of a frame, at each of the levels of detail that draw it, the finest first.
+using LeveledSurface = std::vector<HostLevel>;
 
 /// A hit of a layer on a surface or a slice, with its light: sums of what ambient rays bring.
 struct LayerHit {
@@ -218,11 +222,11 @@ struct HostLoops {
   /// next      [ray of the tile][surface] their first hits, with gradients of cells; overwritten
   /// to        those of the tile's rays are set
   /// Returns   number of rays that hit something
-  uint (*blend)(std::span<const HostLevel> surfaces, const LayerBlend &by, const RayTile &tile,
+  uint (*blend)(std::span<const LeveledSurface> surfaces, const LayerBlend &by, const RayTile &tile,
                 HitRecord *next, const LayersOfRays &to);
   /// The same, ray by ray.
-  uint (*blend_rays)(std::span<const HostLevel> surfaces, const LayerBlend &by, const RayTile &tile,
-                     HitRecord *next, const LayersOfRays &to);
+  uint (*blend_rays)(std::span<const LeveledSurface> surfaces, const LayerBlend &by,
+                     const RayTile &tile, HitRecord *next, const LayersOfRays &to);
   /// Blends hits of a layer behind the layers before, with the filtered light of their sums.
   ///
   /// sums    [ISO_LAYER_SUMS][height * width] of bounced light: see LightOfHits

@@ -38,8 +38,8 @@ uint trace_packets(const FrameParams &frame, const HostField &field, const RayTi
   return packets_avx2::trace_tile(frame, field, tile, hits);
 }
 uint trace_band_packet(const HostLevel &level, uint x, uint y, uint lanes, HitRecord *hits,
-                       BandSides *sides) {
-  return packets_avx2::trace_band(level, x, y, lanes, hits, sides);
+                       bool by_lane, BandSides *sides) {
+  return packets_avx2::trace_band(level, x, y, lanes, hits, by_lane, sides);
 }
 void trace_packet_behind(const HostLevel &surface, uint x, uint y, uint lanes, uint capped,
                          const HitRecord *hits, HitRecord *next) {

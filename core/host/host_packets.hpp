@@ -32,16 +32,19 @@ struct BandSides {
 /// Traces eight rays, 4 columns and 2 rows from (x, y) on, in their intervals in a level of detail,
 /// and writes the hits of cells into hits [height * width].
 ///
+/// by_lane  hits are [8] instead, by lane
 /// lanes    bit column + 4 row: the rays to trace
 /// Out      sides: where the rays begin, if that is behind their start; where the band ends, if it
 ///          does, of those that do not hit
 /// Returns  those that hit something
 uint trace_band_packet(const HostLevel &level, uint x, uint y, uint lanes, HitRecord *hits,
-                       BandSides *sides);
+                       bool by_lane, BandSides *sides);
 
-/// Traces some of eight rays on from their hits on a surface to their next cell with a crossing.
+/// Traces some of eight rays on from their hits on a surface, in the level of detail that has the
+/// hits, to their next cell with a crossing.
 ///
-/// lanes, capped  bit column + 4 row: rays whose hits are crossings, and caps
+/// lanes, capped  bit column + 4 row: rays whose hits are crossings, and those whose hits are where
+///                they begin in the level: on caps, and at borders
 /// hits           [8]
 /// Out            next [8], of rays that hit something there
 void trace_packet_behind(const HostLevel &surface, uint x, uint y, uint lanes, uint capped,
@@ -51,7 +54,7 @@ void trace_packet_behind(const HostLevel &surface, uint x, uint y, uint lanes, u
 uint trace_packets_sse4(const FrameParams &frame, const HostField &field, const RayTile &tile,
                         HitRecord *hits);
 uint trace_band_packet_sse4(const HostLevel &level, uint x, uint y, uint lanes, HitRecord *hits,
-                            BandSides *sides);
+                            bool by_lane, BandSides *sides);
 void trace_packet_behind_sse4(const HostLevel &surface, uint x, uint y, uint lanes, uint capped,
                               const HitRecord *hits, HitRecord *next);
 

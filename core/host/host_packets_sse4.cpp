@@ -37,8 +37,8 @@ uint trace_packets_sse4(const FrameParams &frame, const HostField &field, const 
   return packets_sse4::trace_tile(frame, field, tile, hits);
 }
 uint trace_band_packet_sse4(const HostLevel &level, uint x, uint y, uint lanes, HitRecord *hits,
-                            BandSides *sides) {
-  return packets_sse4::trace_band(level, x, y, lanes, hits, sides);
+                            bool by_lane, BandSides *sides) {
+  return packets_sse4::trace_band(level, x, y, lanes, hits, by_lane, sides);
 }
 void trace_packet_behind_sse4(const HostLevel &surface, uint x, uint y, uint lanes, uint capped,
                               const HitRecord *hits, HitRecord *next) {

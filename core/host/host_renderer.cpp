@@ -20,7 +20,6 @@
 #include "core/platform/memory.hpp"
 #include "core/view/detail.hpp"
 #include "kernels_cl/portable/cell_intersect.h"
-#include "kernels_cl/portable/kept_pixel.h"
 
 namespace isowave::core {
 
@@ -43,8 +42,10 @@ std::uint64_t limit_of(std::uint64_t memory_limit) {
 
 /// Returns the memory limit. Throws Error if frames of num_surfaces surfaces need more.
 std::uint64_t checked_limit(const CompressedVolume &volume, std::uint64_t memory_limit,
-                            std::size_t num_surfaces, std::uint64_t field_bytes = 0) {
-  const std::uint64_t needed = HostLevels::least_bytes(volume, num_surfaces) + field_bytes,
+                            std::size_t num_surfaces, std::uint64_t field_bytes = 0,
+                            bool at_levels = false) {
+  const std::uint64_t needed =
+                          HostLevels::least_bytes(volume, num_surfaces, at_levels) + field_bytes,
                       limit = limit_of(memory_limit);
   if (needed <= limit) return limit;
   throw Error(
@@ -131,7 +132,7 @@ FrameStats HostRenderer::render(const FrameRequest &request) {
   if (request.surfaces.empty()) {
     draw_one(request, frames, size, stats);
   } else {
-    draw_surfaces(request, frames.front(), size, stats);
+    draw_surfaces(request, frames, size, stats);
   }
   stats.complete = !stats.cancelled;
   stats.total_ms = ms_since(begin);
@@ -184,9 +185,9 @@ void HostRenderer::draw_one(const FrameRequest &request, std::span<const FramePa
 }
 
 /// The surfaces of a frame, in that order.
-std::vector<HostLevel> HostRenderer::open_surfaces(const FrameRequest &request,
-                                                   const FrameParams &frame,
-                                                   std::span<const std::uint32_t> order) {
+std::vector<LeveledSurface> HostRenderer::open_surfaces(const FrameRequest &request,
+                                                        std::span<const FrameParams> frames,
+                                                        std::span<const std::uint32_t> order) {
   const std::uint64_t of_field = request.field_values ? field_->own_bytes(request) : 0;
   if (!request.surfaces.front().labels.empty()) {
     check_labels(volume_);
@@ -194,45 +195,63 @@ std::vector<HostLevel> HostRenderer::open_surfaces(const FrameRequest &request,
                   HostLevels::bytes_of_labels(info_, request.surfaces.size()) + of_field);
     std::vector<std::vector<std::uint16_t>> groups;
     for (const std::uint32_t number : order) groups.push_back(request.surfaces[number].labels);
-    return levels_.open_labels(frame, groups);
+    return levels_.open_labels(frames.front(), groups);
   }
-  checked_limit(volume_, memory_limit_, request.surfaces.size(), of_field);
+  checked_limit(volume_, memory_limit_, request.surfaces.size(), of_field,
+                request.voxel_pixels != 0);
   std::vector<float> isovalues;
   for (const std::uint32_t number : order) isovalues.push_back(request.surfaces[number].isovalue);
-  return levels_.open_surfaces(frame, isovalues, request.voxel_error);
+  return levels_.open_surfaces(frames, isovalues, request.voxel_error);
 }
 
-/// Several or translucent surfaces: in each tile, first hits on each of them, and then their
-/// layers.
-void HostRenderer::draw_surfaces(const FrameRequest &request, const FrameParams &frame,
-                                 ImageSize size, FrameStats &stats) {
-  const bool has_field = request.field_values;
-  LayerBlend by{.shading = make_layer_shading(info_, request,
-                                              has_field ? field_->volume_range() : std::nullopt),
-                .colors = make_layer_params(request.surfaces, request.slices, info_, frame.view,
-                                            request.camera),
-                .numbers = innermost_first(request.surfaces),
-                .is_smooth = request.normals == Normals::kSmooth,
-                .clip = make_clip_params(info_, frame.view, request.camera, request.clip),
-                .slice_map = make_field_map({&info_, 1}, info_),
-                .field = has_field ? &*field_ : nullptr};
+/// How a frame's surfaces are blended.
+///
+/// directions  make_light_directions()
+LayerBlend HostRenderer::blend_of(const FrameRequest &request, std::span<const FrameParams> frames,
+                                  std::span<const AmbientDirection> directions) const {
   const LightRays light_rays = light_rays_of(request);
-  const std::vector<AmbientDirection> directions = make_light_directions(light_rays);
-  by.rays = {make_ambient_params(info_, light_rays.num_ambient),
+  const View &view = frames.front().view;
+  const auto first = static_cast<std::size_t>(std::ranges::find_if(frames, draws) - frames.begin());
+  const std::vector<FieldMap> own_maps = make_own_maps(levels_.infos());
+  LayerBlend by{
+      .shading = make_layer_shading(info_, request,
+                                    request.field_values ? field_->volume_range() : std::nullopt),
+      .colors = make_layer_params(request.surfaces, request.slices, info_, view, request.camera),
+      .numbers = innermost_first(request.surfaces),
+      .is_smooth = request.normals == Normals::kSmooth,
+      .clip = make_clip_params(info_, view, request.camera, request.clip),
+      .finest = &frames.front(),
+      .slice_maps = {own_maps.begin() + static_cast<std::ptrdiff_t>(first), own_maps.end()},
+      .field = request.field_values ? &*field_ : nullptr};
+  by.rays = {make_ambient_params(levels_.infos()[first], light_rays.num_ambient),
              directions.data(),
              light_rays.count(),
-             &frame,
+             &frames[first],
              0,
-             1,
+             std::ldexp(1.0f, static_cast<int>(first)),
              light_rays.bounces};
   by.any_is_whole = any_is_whole(request.surfaces);
   for (const std::size_t place : light_order(request.surfaces))
     by.opaque[request.surfaces[by.numbers[place]].clipped ? 1 : 0].push_back(place);
-  std::vector<HostLevel> surfaces = open_surfaces(request, frame, by.numbers);
-  if (has_field) field_->begin_frame(request);
+  return by;
+}
+
+/// Several or translucent surfaces: in each tile, first hits on each of them, and then their
+/// layers.
+void HostRenderer::draw_surfaces(const FrameRequest &request, std::span<const FrameParams> frames,
+                                 ImageSize size, FrameStats &stats) {
+  const FrameParams &frame = frames.front();
+  const LightRays light_rays = light_rays_of(request);
+  const std::vector<AmbientDirection> directions = make_light_directions(light_rays);
+  const LayerBlend by = blend_of(request, frames, directions);
+  std::vector<LeveledSurface> surfaces = open_surfaces(request, frames, by.numbers);
+  if (request.field_values) field_->begin_frame(request);
+  stats.first_level =
+      static_cast<std::size_t>(std::ranges::find_if(frames, draws) - frames.begin());
+  stats.last_level = stats.first_level + surfaces.front().size() - 1;
   for (std::size_t k = 0; k < surfaces.size(); ++k) {
     if (request.surfaces[by.numbers[k]].clipped)
-      clip_levels({&surfaces[k], 1}, by.clip, frame.screen);
+      clip_levels(surfaces[k], by.clip, frames[stats.first_level].screen);
   }
   std::mutex mutex;
   LayerHits layers(light_rays.bounces ? ISO_MAX_LAYERS : 0);
@@ -241,7 +260,7 @@ void HostRenderer::draw_surfaces(const FrameRequest &request, const FrameParams 
                         num_rays = columns * (tile.end_y - tile.begin_y);
     std::vector<HitRecord> next(num_rays * surfaces.size(), no_hit());
     for (std::size_t k = 0; k < surfaces.size(); ++k) {
-      if (trace({&surfaces[k], 1}, tile, is_alone, false) == 0) continue;
+      if (trace(surfaces[k], tile, is_alone, false) == 0) continue;
       for (std::uint32_t i = 0; i < num_rays; ++i) {
         const std::size_t ray = tile.begin_x + i % columns +
                                 std::size_t{frame.view.width} * (tile.begin_y + i / columns);
@@ -286,7 +305,7 @@ void HostRenderer::blend_bounced(const FrameParams &frame, const LayerBlend &by,
       parts[3][at.ray] = sum.b;
       if (!is_of_slice(&by.colors, at.hit)) hits[at.ray] = at.hit;
     }
-    const std::vector<GivenRay> places = places_of(frame, by.rays.params, hits);
+    const std::vector<GivenRay> places = places_of(*by.rays.seen, by.rays.params, hits);
     std::vector<float> sums;
     for (std::vector<float> &part : parts) {
       filter_bounced(frame.view, places, part);
@@ -525,76 +544,6 @@ Camera HostRenderer::label_camera(std::span<const std::uint16_t> labels,
   check_labels(volume_);
   checked_limit(volume_, memory_limit_, 1, HostLevels::bytes_of_labels(info_, 1));
   return surface_camera(info_, levels_.label_box(labels), of_picture, from);
-}
-
-void HostRenderer::keep_picture() {
-  check_has_picture();
-  kept_ = hits_;
-  kept_size_ = size_;
-}
-
-void HostRenderer::enlarge_kept(const FrameRequest &request) {
-  core::check(request, abilities());
-  const ImageSize size = size_of(request, abilities());
-  frame_ = make_frame_params(info_, request.camera, size, request.isovalue);
-  size_ = size;
-  open_ = {};
-  field_values_.clear();
-  hits_.resize(size.num_rays());
-  show_kept(true);
-}
-
-/// Fills the picture from the kept one, enlarged: rays without a hit, or all.
-void HostRenderer::show_kept(bool everywhere) {
-  check_has_picture();
-  if (kept_.empty()) throw Error("there is no picture: none was kept");
-  colors_ = {};
-  parallel_for(frame_.view.height, num_threads_, [&](std::uint64_t row, std::uint32_t) {
-    const auto first = static_cast<uint>(row * frame_.view.width);
-    for (uint ray = first; ray < first + frame_.view.width; ++ray) {
-      if (!everywhere && hits_[ray].t < INFINITY) continue;
-      hits_[ray] =
-          kept_[kept_pixel(&frame_.view, kept_size_.ray_columns(), kept_size_.ray_rows(), ray)];
-    }
-  });
-}
-
-void HostRenderer::check_has_picture() const {
-  if (hits_.empty()) throw Error("there is no picture: no frame has been drawn");
-}
-
-std::vector<HitRecord> HostRenderer::hits() {
-  check_has_picture();
-  return hits_;
-}
-
-FrameArrays HostRenderer::fetch(const WantedArrays &wanted, const Appearance &appearance) {
-  check_has_picture();
-  check_arrays(wanted, size_);
-  const Shading shading = shading_of(info_, appearance);
-  const ShadeParams &params = shading.params;
-  FrameArrays arrays;
-  if (wanted.picture) {
-    const std::size_t channels = num_channels(&params);
-    arrays.picture = memory_.array<std::uint8_t>(channels * size_.num_pixels());
-    parallel_for(size_.height, num_threads_, [&](std::uint64_t row, std::uint32_t) {
-      std::uint8_t *const pixels = arrays.picture.data() + channels * size_.width * row;
-      if (colors_.empty()) {
-        host_loops().shade(frame_, shading, size_.samples, static_cast<uint>(row), hits_.data(),
-                           open_.of_hits(), field_values_.data(), pixels);
-      } else {
-        host_loops().shade_layers(frame_, params, size_.samples, static_cast<uint>(row),
-                                  colors_.data(), pixels);
-      }
-    });
-  }
-  const HitMap map = make_hit_map(levels());
-  add_hit_arrays(wanted, hits_, params, &map, memory_, arrays);
-  if (wanted.field_values) {
-    arrays.field_values = memory_.array<float>(field_values_.size());
-    std::ranges::copy(field_values_, arrays.field_values.begin());
-  }
-  return arrays;
 }
 
 }  // namespace isowave::core

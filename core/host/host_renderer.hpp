@@ -92,10 +92,13 @@ class HostRenderer : public Renderer {
                     Draw draw);
   void draw_one(const FrameRequest &request, std::span<const FrameParams> frames, ImageSize size,
                 FrameStats &stats);
-  std::vector<HostLevel> open_surfaces(const FrameRequest &request, const FrameParams &frame,
-                                       std::span<const std::uint32_t> order);
-  void draw_surfaces(const FrameRequest &request, const FrameParams &frame, ImageSize size,
-                     FrameStats &stats);
+  std::vector<LeveledSurface> open_surfaces(const FrameRequest &request,
+                                            std::span<const FrameParams> frames,
+                                            std::span<const std::uint32_t> order);
+  LayerBlend blend_of(const FrameRequest &request, std::span<const FrameParams> frames,
+                      std::span<const AmbientDirection> directions) const;
+  void draw_surfaces(const FrameRequest &request, std::span<const FrameParams> frames,
+                     ImageSize size, FrameStats &stats);
   std::uint64_t trace(std::span<const HostLevel> drawing, const RayTile &tile, bool is_alone,
                       bool is_smooth);
   template <class DrawTile>

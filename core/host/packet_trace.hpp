@@ -164,7 +164,7 @@ inline void keep_sides(Ints of_lanes, Mask lanes, uchar *sides) {
 
 /// As trace_band_packet().
 __attribute__((flatten)) inline uint trace_band(const HostLevel &level, uint x, uint y, uint lanes,
-                                                HitRecord *hits, BandSides *sides) {
+                                                HitRecord *hits, bool by_lane, BandSides *sides) {
   const FrameParams &frame = level.frame;
   const Ints column = columns_from(x), row = rows_from(y);
   const Mask of = lanes_of(lanes);
@@ -185,8 +185,8 @@ __attribute__((flatten)) inline uint trace_band(const HostLevel &level, uint x, 
   if (any(begins_late))
     keep_sides(find_sides(&scene, &p.rays, p.rays.begin_t, begins_late), begins_late,
                sides->at_begin);
-  const Mask found =
-      is_active ? trace_packet(scene, ray_ids(frame, column, row), drawn, hits, &p) : ints(0);
+  const Ints ids = by_lane ? Ints{0, 1, 2, 3, 4, 5, 6, 7} : ray_ids(frame, column, row);
+  const Mask found = is_active ? trace_packet(scene, ids, drawn, hits, &p) : ints(0);
   const Mask left = drawn & ~found & (p.rays.end_t == frame.band.end_t);
   if (frame.band.end_t < ISO_NEVER && any(left))
     keep_sides(find_sides(&scene, &p.rays, p.rays.end_t, left), left, sides->at_end);

@@ -83,6 +83,13 @@ std::vector<Level> make_level(ocl::Device &device, const CompressedVolume &volum
 
 }  // namespace
 
+std::vector<VolumeInfo> infos_of(const std::vector<Level> &levels) {
+  std::vector<VolumeInfo> infos;
+  infos.reserve(levels.size());
+  for (const Level &level : levels) infos.push_back(level.info);
+  return infos;
+}
+
 BlockStore::BlockStore(ocl::Device &of, const CompressedVolume &volume, DeviceStream stream,
                        const BlockCache::Limits &limits, std::uint32_t group_size)
     : device(of),
@@ -117,6 +124,7 @@ void BlockStore::open(Wavefront &rays, std::vector<FrameParams> frames,
   drawing = {static_cast<std::size_t>(first - frames.begin()),
              static_cast<std::size_t>(end - frames.begin())};
   const bool has_bands = end - first > 1;
+  whole_screen_ = first->screen;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     Level &level = levels[i];
     FrameParams &frame = frames[i];
@@ -161,16 +169,22 @@ void BlockStore::set_groups(std::span<const std::uint8_t> table) {
 }
 
 void BlockStore::show_surface(Wavefront &rays, std::size_t selection, float isovalue, uint group) {
-  Level &level = levels[drawing.first];
-  level.macrocells.use(selection);
-  FrameParams frame = level.frame;
-  frame.surface.isovalue = isovalue;
-  frame.surface.isovalue_index = group;
-  select(level, frame, !rays.is_clipped());
-  level.frame = rays.frame = frame;
-  level_frames->assign(1, frame);
+  levels[0].macrocells.use(selection);  // at all levels
+  const bool has_box = drawing.end - drawing.first == 1 && !rays.is_clipped();
+  level_frames->clear();
+  for (std::size_t i = drawing.first; i < drawing.end; ++i) {
+    Level &level = levels[i];
+    FrameParams frame = level.frame;
+    frame.surface.isovalue = isovalue;
+    frame.surface.isovalue_index = group;
+    if (i == drawing.first) frame.screen = whole_screen_;
+    select(level, frame, has_box);
+    level.frame = frame;
+    level_frames->push_back(frame);
+  }
+  rays.frame = level_frames->front();
   if (levels.size() > 1) rays.level_frames.write_async(*level_frames);
-  classify(rays, frame.surface);
+  classify(rays, rays.frame.surface);
 }
 
 /// Has blocks decoded to these values, and forgets those of others.

@@ -34,6 +34,8 @@ struct Level {
   double range_error = 0;  ///< largest error of voxels of fewer bit planes
 };
 
+std::vector<VolumeInfo> infos_of(const std::vector<Level> &levels);
+
 /// Levels of detail: from `first` to below `end`.
 struct LevelRange {
   std::size_t first = 0, end = 1;
@@ -80,7 +82,7 @@ class BlockStore {
   /// cleared. Does not wait.
   void go_on_with(const std::vector<DecodedValues> &values);
 
-  /// Goes on with another surface of the frame at work, which one level of detail draws.
+  /// Goes on with another surface of the frame at work, at all levels of detail that draw it.
   ///
   /// selection  its selection of active blocks (MacrocellBuffers), 0: that of open()
   /// group      of labels, its group
@@ -163,6 +165,7 @@ class BlockStore {
   bool is_small_ = false;            ///< slots may run out within one pass
   bool slots_are_scarce_ = true;     ///< free slots may not suffice for the next passes
   Schedule schedule_{};              ///< every frame's, except table_groups
+  ScreenBox whole_screen_{};         ///< of the frame at work: of all rays that meet the volume
   std::optional<LevelRange> asked_;  ///< levels whose blocks the last pass may have asked for
   /// Isovalue and group of the cache's bits of voxels inside.
   std::optional<std::pair<float, uint>> cached_surface_;

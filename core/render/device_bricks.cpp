@@ -17,23 +17,23 @@ std::vector<HitRecord> DeviceRenderer::placed_hits() {
 /// placed_hit()s, whose levels of detail count on from first_level.
 std::vector<HitRecord> DeviceRenderer::placed(std::vector<HitRecord> hits,
                                               std::size_t first_level) const {
-  const bool has_level_ids =
-      blocks_.level_frames->size() > 1 || blocks_.level_frames->front().place.begin_z != 0;
   for (HitRecord &hit : hits) {
-    if (hit.t == std::numeric_limits<float>::infinity()) continue;
-    std::size_t level = 0;
-    while (has_level_ids &&
-           level_block_of(&(*blocks_.level_frames)[level], hit.block_id) == ISO_INVALID_ID)
-      ++level;
-    const FrameParams &frame = (*blocks_.level_frames)[level];
-    if (has_level_ids) hit.block_id = level_block_of(&frame, hit.block_id);
-    hit = placed_hit(&frame, static_cast<uint>(first_level + level), hit);
+    if (hit.t != std::numeric_limits<float>::infinity()) hit = placed(hit, first_level);
   }
   return hits;
 }
 
+HitRecord DeviceRenderer::placed(HitRecord hit, std::size_t first_level) const {
+  const std::vector<FrameParams> &frames = *blocks_.level_frames;
+  const bool has_level_ids = frames.size() > 1 || frames.front().place.begin_z != 0;
+  std::size_t level = 0;
+  while (has_level_ids && level_block_of(&frames[level], hit.block_id) == ISO_INVALID_ID) ++level;
+  if (has_level_ids) hit.block_id = level_block_of(&frames[level], hit.block_id);
+  return placed_hit(&frames[level], static_cast<uint>(first_level + level), hit);
+}
+
 HitRecord DeviceRenderer::placed(const HitRecord &hit) const {
-  return placed_hit(&blocks_.level_frames->front(), 0, hit);
+  return placed(hit, blocks_.drawing.first);
 }
 
 std::vector<RayHit> DeviceRenderer::first_layer_so_far(const FrameRequest &request) {
@@ -128,7 +128,7 @@ std::vector<HitRecord> DeviceRenderer::met_hits(const FrameRequest &request, std
     at_work.close();
     for (HitRecord &hit : met) {
       if (hit.t != std::numeric_limits<float>::infinity())
-        hit = with_surface(placed(hit), surface_of(hit));
+        hit = with_surface(placed(hit, 0), surface_of(hit));
     }
     return met;
   }
@@ -139,7 +139,7 @@ std::vector<HitRecord> DeviceRenderer::met_hits(const FrameRequest &request, std
   for (std::size_t ray = 0; ray < met.size(); ++ray) {
     if (!is_given(rays[ray])) met[ray] = no_hit();
     if (met[ray].t == std::numeric_limits<float>::infinity()) continue;
-    const float in_first = std::ldexp(1.0f, static_cast<int>(rays[ray].level));
+    const float in_first = std::ldexp(1.0f, static_cast<int>(level_of_given(rays[ray])));
     if (is_clipped(&rays_.clip_params(), rays[ray], voxel * in_first,
                    met[ray].t / (rays_.frame.view.t_scale * in_first)))
       met[ray] = no_hit();
@@ -149,7 +149,8 @@ std::vector<HitRecord> DeviceRenderer::met_hits(const FrameRequest &request, std
 }
 
 ClipParams DeviceRenderer::clip_of(const FrameRequest &request) const {
-  return make_clip_params(blocks_.levels[0].info, rays_.frame.view, request.camera, request.clip);
+  const Level &finest = blocks_.levels[0];
+  return make_clip_params(finest.info, finest.frame.view, request.camera, request.clip);
 }
 
 std::vector<GivenRay> DeviceRenderer::light_rays() const {

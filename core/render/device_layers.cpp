@@ -43,16 +43,17 @@ void DeviceRenderer::draw_layers(const FrameRequest &request, Frame &frame) {
   frame.waves_left = std::numeric_limits<std::uint32_t>::max();  // as many as it takes
   frame.num_waves = 0;
   last_view_.reset();
-  const VolumeInfo &finest = blocks_.levels[0].info;
-  layers_->open(
-      request.surfaces,
-      make_layer_params(request.surfaces, request.slices, finest, rays_.frame.view, request.camera),
-      make_layer_shading(finest, request,
-                         request.field_values ? field_->volume_range() : std::nullopt));
+  const Level &finest = blocks_.levels[0];
+  layers_->open(request.surfaces,
+                make_layer_params(request.surfaces, request.slices, finest.info, finest.frame.view,
+                                  request.camera),
+                make_layer_shading(finest.info, request,
+                                   request.field_values ? field_->volume_range() : std::nullopt),
+                finest.frame);
   layers_->clear(rays_);
   if (!request.slices.planes.empty()) rays_.field_values.fill(no_value());
   has_layers_ = true;
-  const ClipParams clip = make_clip_params(finest, rays_.frame.view, request.camera, request.clip);
+  const ClipParams clip = clip_of(request);
   const std::size_t num_surfaces = find_first_hits(request, clip, isovalues, frame);
   isovalues.resize(num_surfaces);
   stats.rays_hit = 0;
@@ -164,13 +165,14 @@ void DeviceRenderer::bounce_layer_round(std::uint32_t round, const FrameRequest 
 }
 
 /// Casts one light ray of each hit of a layer, which may meet any opaque surface: first those that
-/// clipping planes leave whole.
+/// clipping planes leave whole. Each goes through its hit's level of detail of all surfaces.
 void DeviceRenderer::cast_layer_round(std::uint32_t round, const FrameRequest &request,
                                       const ClipParams &clip, std::span<const float> isovalues,
                                       RoundEnd end, Frame &frame) {
   bool may_enter = clip.num_planes != 0 && any_is_whole(request.surfaces);
   bool goes_on = end == RoundEnd::kBlocksLight;
   ocl::Buffer<HitRecord> *const nearest = end == RoundEnd::kNearest ? &bounce_->nearest : nullptr;
+  const bool has_caps = may_enter && clip.with_caps != 0;
   for (const std::size_t place : light_order(request.surfaces)) {
     // A frame that is stopped has the first hits of fewer surfaces.
     if (place >= isovalues.size() || frame.stats.cancelled) break;
@@ -178,6 +180,7 @@ void DeviceRenderer::cast_layer_round(std::uint32_t round, const FrameRequest &r
     const bool enters = request.surfaces[number].clipped && std::exchange(may_enter, false);
     show_surface(request, clip, place, isovalues[place]);
     rays_.frame.screen = layers_screen_;  // of all hits
+    rays_.given_at_caps = has_caps && request.surfaces[number].clipped;
     ambient_round_->set_round(round, std::exchange(goes_on, true), enters, nearest);
     run(*ambient_round_, frame);
     if (nearest != nullptr) {
@@ -186,6 +189,7 @@ void DeviceRenderer::cast_layer_round(std::uint32_t round, const FrameRequest &r
       ambient_->block(rays_);
     }
   }
+  rays_.given_at_caps = false;
 }
 
 /// Behind the last layer that is drawn, hits are counted alone.

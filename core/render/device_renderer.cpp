@@ -42,13 +42,6 @@ struct FrameOfPicture {
   ~FrameOfPicture() { rays.frame = frame; }
 };
 
-std::vector<VolumeInfo> infos_of(const std::vector<Level> &levels) {
-  std::vector<VolumeInfo> infos;
-  infos.reserve(levels.size());
-  for (const Level &level : levels) infos.push_back(level.info);
-  return infos;
-}
-
 LaterPasses later_pass(const PassStats &pass) {
   return {1, pass.counts.decoded_count, pass.counts.recycled_count, 0, pass.stage_ms};
 }
@@ -221,7 +214,7 @@ DeviceRenderer::DeviceRenderer(ocl::Device &device, const CompressedVolume &volu
   const MemoryPlan &plan = blocks_.plan;
   if (plan.limits.kept_rays != 0) kept_.emplace(device, plan.limits.kept_rays);
   if (options_.max_surfaces != 0) {
-    layers_.emplace(device, plan.limits.layers, options_.group_size);
+    layers_.emplace(device, plan.limits.layers, options_.group_size, blocks_.levels.size() > 1);
     behind_.emplace(blocks_, rays_, *layers_, options_.group_size, options_.solver);
     layer_normals_.emplace(blocks_, rays_, smooth_normals_, *layers_);
     slice_values_.emplace(blocks_, rays_, *layers_, options_.group_size);
@@ -269,7 +262,7 @@ void DeviceRenderer::compile_kernels() {
     for (Level &level : blocks_.levels) level.frame = rays.frame;
     std::vector<Wave *> waves{camera_rays_.get()};
     if (options_.with_shading) waves.push_back(&normals_of_camera_);
-    if (behind_ && num_levels == 1) {
+    if (behind_) {
       layers_->compile(rays);
       waves.push_back(&*behind_);
     }

@@ -212,6 +212,7 @@ class DeviceRenderer : public Renderer {
   void light_surface(const LightRays &light_rays, Frame &frame);
   void cast_round(std::uint32_t round, Frame &frame, bool goes_on = false);
   std::vector<HitRecord> placed(std::vector<HitRecord> hits, std::size_t first_level) const;
+  HitRecord placed(HitRecord hit, std::size_t first_level) const;
   void bounce_round(std::uint32_t round, Frame &frame);
   void count_last_round(std::uint32_t num_rounds, Frame &frame);
   void add_stage_times(LaterPasses &passes);

@@ -241,7 +241,7 @@ MemoryPlan plan_memory(const CompressedVolume &volume, const MemoryRequest &requ
   if (request.with_bounce)
     plan.buffers.add(Bounce::sizes(request.max_surfaces != 0 ? request.num_rays : 0));
   if (limits.layers.max_surfaces != 0)
-    plan.buffers.add(Layers::sizes(limits.layers)).add(FieldValues::sizes(0));
+    plan.buffers.add(Layers::sizes(limits.layers)).add(FieldValues::sizes(0, levels.size()));
   if (limits.kept_rays != 0) plan.buffers.add(KeptPicture::sizes(limits.kept_rays));
   return plan;
 }

@@ -69,9 +69,10 @@ BehindWave::BehindWave(BlockStore &blocks, Wavefront &rays, Layers &layers,
     : blocks_(blocks),
       rays_(rays),
       layers_(layers),
-      march_(blocks.device, rays.num_rays, group_size, solver, false, RaySource::kBehindHits,
-             blocks.cache.slot_type),
-      request_ahead_(blocks.device, rays.num_rays, group_size, false, RaySource::kBehindHits) {}
+      march_(blocks.device, rays.num_rays, group_size, solver, blocks.levels.size() > 1,
+             RaySource::kBehindHits, blocks.cache.slot_type),
+      request_ahead_(blocks.device, rays.num_rays, group_size, blocks.levels.size() > 1,
+                     RaySource::kBehindHits) {}
 
 void BehindWave::begin() {
   const auto stage = blocks_.device.timer().stage("start_rays");
@@ -110,10 +111,10 @@ void LayerNormalsWave::begin() {
 
 void SliceValuesWave::set_layer(bool is_first, uint surfaces) {
   is_first_layer_ = is_first;
-  const VolumeInfo &volume = blocks_.levels[0].info;
-  FieldMap map = make_field_map({&volume, 1}, volume);
-  map.surfaces = surfaces;
-  values_.set_map(map);
+  std::vector<FieldMap> maps = make_own_maps(infos_of(blocks_.levels));
+  for (FieldMap &map : maps) map.surfaces = surfaces;
+  const auto first = maps.begin() + std::ptrdiff_t(blocks_.drawing.first);
+  values_.set_maps({first, first + std::ptrdiff_t(blocks_.drawing.end - blocks_.drawing.first)});
 }
 
 void SliceValuesWave::begin() {

@@ -122,7 +122,8 @@ class LayerNormalsWave : public SmoothNormalsWave {
   Layers &layers_;
 };
 
-/// Gives the hits of a layer on slices, in rays.hits, the values of the voxels there.
+/// Gives the hits of a layer on slices, in rays.hits, the values of the voxels there, in their
+/// levels of detail.
 class SliceValuesWave : public Wave {
  public:
   /// blocks, rays, layers: must outlive the wave.
@@ -130,7 +131,8 @@ class SliceValuesWave : public Wave {
       : blocks_(blocks),
         rays_(rays),
         layers_(layers),
-        values_(blocks.device, rays.num_rays, group_size, blocks.cache.slot_type) {}
+        values_(blocks.device, rays.num_rays, group_size, blocks.cache.slot_type, 0,
+                blocks.levels.size()) {}
 
   /// surfaces  FieldMap::surfaces, of the slices
   void set_layer(bool is_first, uint surfaces);

@@ -30,11 +30,11 @@ ocl::BufferSizes Layers::sizes(const Limits &limits) {
   return sizes;
 }
 
-Layers::Layers(ocl::Device &device, const Limits &limits, std::uint32_t group_size)
-    : Layers(device, limits, sizes(limits), group_size) {}
+Layers::Layers(ocl::Device &device, const Limits &limits, std::uint32_t group_size, bool levels)
+    : Layers(device, limits, sizes(limits), group_size, levels) {}
 
 Layers::Layers(ocl::Device &device, const Limits &limits, const ocl::BufferSizes &sizes,
-               std::uint32_t group_size)
+               std::uint32_t group_size, bool levels)
     : colors(device, sizes["colours of rays"]),
       range_(ocl::Range::strided(limits.num_rays, group_size, device)),
       further_hits_(device, sizes["hits of a layer"]),
@@ -45,7 +45,7 @@ Layers::Layers(ocl::Device &device, const Limits &limits, const ocl::BufferSizes
       next_listed_(device, sizes["rays of the next layer"]),
       counts_(device, sizes["layer counts"]),
       next_counts_(device, sizes["layer counts, next"]),
-      choose_(device, group_defines(group_size)),
+      choose_(device, group_defines(group_size), levels),
       forget_(device, group_defines(group_size)),
       blend_(device, group_defines(group_size)),
       begin_(device, group_defines(group_size)) {
@@ -57,6 +57,7 @@ void Layers::compile(Wavefront &rays) {
   order_ = {0};
   static constexpr LayerParams kNone{};
   params_.write({&kNone, 1});
+  finest_ = rays.frame;
   clear(rays);
   forget(rays, rays.hits);
   choose(rays, 1, true);
@@ -64,8 +65,9 @@ void Layers::compile(Wavefront &rays) {
 }
 
 void Layers::open(const std::vector<SurfaceStyle> &surfaces, const LayerParams &params,
-                  const Shading &light) {
+                  const Shading &light, const FrameParams &finest) {
   order_ = innermost_first(surfaces);
+  finest_ = finest;
   light_ = light.params;
   color_map_.write(light.color_map);
   params_.write({&params, 1});
@@ -73,8 +75,9 @@ void Layers::open(const std::vector<SurfaceStyle> &surfaces, const LayerParams &
 
 void Layers::choose(Wavefront &rays, std::size_t num_surfaces, bool is_first) {
   for (std::size_t place = 0; place < num_surfaces; ++place)
-    choose_(range_, rays.frame, order_[place], place == 0 ? 1 : 0, is_first ? 1 : 0, rays.clip,
-            params_, counts_, listed_, surface_hits_[place], passed_, rays.hits);
+    choose_.of(rays)(range_, rays.frame, rays.level_frames, rays.num_level_frames, order_[place],
+                     place == 0 ? 1 : 0, is_first ? 1 : 0, rays.clip, params_, counts_, listed_,
+                     surface_hits_[place], passed_, rays.hits);
 }
 
 void Layers::clear(const Wavefront &rays) {
@@ -89,7 +92,7 @@ LayerCounts Layers::blend(Wavefront &rays, bool is_first, uint how) {
   static constexpr LayerCounts kNone{};
   next_counts_.write_async({&kNone, 1});
   // While rays.hits are those of a further layer, those of the first are in further_hits_.
-  blend_(range_, rays.frame, light_, color_map_, how, is_first ? 1 : 0, params_, counts_, listed_,
+  blend_(range_, finest_, light_, color_map_, how, is_first ? 1 : 0, params_, counts_, listed_,
          rays.field_values, rays.open_counts, rays.num_ambient, rays.num_shadow, rays.bounced,
          rays.num_bounced, rays.hits, further_hits_, passed_, colors, next_counts_, next_listed_);
   return next_counts_.read().front();

@@ -28,7 +28,8 @@ class Layers {
   };
   static ocl::BufferSizes sizes(const Limits &limits);
 
-  Layers(ocl::Device &device, const Limits &limits, std::uint32_t group_size);
+  /// levels: frames may have several levels of detail.
+  Layers(ocl::Device &device, const Limits &limits, std::uint32_t group_size, bool levels = false);
 
   /// Launches the kernels that no wave launches, see Device::Compiling.
   void compile(Wavefront &rays);
@@ -36,9 +37,10 @@ class Layers {
   /// Before the waves of a frame.
   ///
   /// params  make_layer_params() of the surfaces
+  /// finest  the frame of the finest level of detail, for shading
   /// Waits   yes
   void open(const std::vector<SurfaceStyle> &surfaces, const LayerParams &params,
-            const Shading &light);
+            const Shading &light, const FrameParams &finest);
 
   /// The number of the surface at a place of innermost_first().
   std::uint32_t surface_at(std::size_t place) const { return order_[place]; }
@@ -94,7 +96,7 @@ class Layers {
 
  private:
   Layers(ocl::Device &device, const Limits &limits, const ocl::BufferSizes &sizes,
-         std::uint32_t group_size);
+         std::uint32_t group_size, bool levels);
 
   ocl::Range range_;
   std::vector<ocl::Buffer<HitRecord>> surface_hits_;  ///< [surface] by pixel, innermost first
@@ -106,7 +108,8 @@ class Layers {
   ocl::Buffer<LayerCounts> counts_, next_counts_;
   std::vector<std::uint32_t> order_;
   ShadeParams light_{};
-  ocl::Kernel<kernels::layers_choose> choose_;
+  FrameParams finest_{};
+  LevelledKernel<kernels::layers_choose> choose_;
   ocl::Kernel<kernels::layers_forget> forget_;
   ocl::Kernel<kernels::layers_blend> blend_;
   ocl::Kernel<kernels::layers_begin> begin_;

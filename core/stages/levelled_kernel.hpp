@@ -39,8 +39,8 @@ class LevelledKernel {
   std::optional<ocl::Kernel<Signature>> levels_;
 };
 
-/// A kernel whose rays are clipped, if they are the camera's. Versions that clip are compiled for
-/// the first frame that needs them.
+/// A kernel whose rays are clipped, if they are the camera's, or may begin at caps, if they are
+/// given. Versions for such rays are compiled for the first frame that needs them.
 template <class Signature>
 class ClippedKernel {
  public:
@@ -48,11 +48,11 @@ class ClippedKernel {
       : device_(device),
         defines_(with_source(defines, source)),
         has_levels_(levels),
-        clips_(source != RaySource::kGiven),
+        is_given_(source == RaySource::kGiven),
         whole_(device, defines_, levels) {}
 
   ocl::Kernel<Signature> &of(const Wavefront &rays) {
-    if (!clips_ || !rays.is_clipped()) return whole_.of(rays);
+    if (!(is_given_ ? rays.given_at_caps : rays.is_clipped())) return whole_.of(rays);
     if (!clipped_) clipped_.emplace(device_, with_clip(defines_), has_levels_);
     return clipped_->of(rays);
   }
@@ -60,7 +60,7 @@ class ClippedKernel {
  private:
   ocl::Device &device_;
   ocl::Defines defines_;
-  bool has_levels_, clips_;
+  bool has_levels_, is_given_;
   LevelledKernel<Signature> whole_;
   std::optional<LevelledKernel<Signature>> clipped_;
 };

@@ -100,6 +100,7 @@ struct Wavefront {
   ocl::Buffer<HitRecord> hits;        ///< [R] by pixel: the picture so far
   ocl::Buffer<GivenRay> given;        ///< [R] of any origin; empty unless there may be some
   ocl::Buffer<HitRecord> given_hits;  ///< [R] hits of given rays
+  bool given_at_caps = false;         ///< given rays may begin at caps: see entering()
   ocl::Buffer<uchar> open_counts;     ///< [2][R] by pixel: see LightOfHits
   ocl::Buffer<float> bounced;         ///< [bounced_sums][R] by pixel: see LightOfHits; may be empty
   ocl::Buffer<float> bounced_next;    ///< [bounced_sums][R] scratch

@@ -120,6 +120,13 @@ ISO_INLINE uint first_block(const FrameParams *frame, const Ray *ray) {
       (uint)locate(ray->z, 2, enter, 4, frame->surface.active_begin_z, (end.z - 1) / 4));
 }
 
+/// Is block (x,y,z) in the box of active blocks?
+ISO_INLINE int is_in_box(const FrameParams *frame, int x, int y, int z) {
+  return x >= frame->surface.active_begin_x && x < frame->surface.active_end_x &&
+         y >= frame->surface.active_begin_y && y < frame->surface.active_end_y &&
+         z >= frame->surface.active_begin_z && z < frame->surface.active_end_z;
+}
+
 /// The block behind block b on the ray, or ISO_INVALID_ID behind all active ones, or the ray's
 /// interval.
 ISO_INLINE uint block_behind(const FrameParams *frame, const Ray *ray, BlockCoords b,
@@ -127,10 +134,7 @@ ISO_INLINE uint block_behind(const FrameParams *frame, const Ray *ray, BlockCoor
   GridWalk w = walk_from(ray, (int)b.x, (int)b.y, (int)b.z, 4, last);
   const RayEvent exit = walk_exit(&w, ray);
   walk_step(&w, ray, exit, 4, last);
-  return !ends_ray(ray, exit) && w.x >= frame->surface.active_begin_x &&
-                 w.x < frame->surface.active_end_x && w.y >= frame->surface.active_begin_y &&
-                 w.y < frame->surface.active_end_y && w.z >= frame->surface.active_begin_z &&
-                 w.z < frame->surface.active_end_z
+  return !ends_ray(ray, exit) && is_in_box(frame, w.x, w.y, w.z)
              ? block_id_at(frame, (uint)w.x, (uint)w.y, (uint)w.z)
              : ISO_INVALID_ID;
 }

@@ -133,8 +133,17 @@ ISO_LONG uint cross_borders(global const FrameParams *frames, uint num_frames,
   const FrameParams *frame = ((void)frames, (void)num_frames, &frame_params)
 #endif
 
+/// block_behind() the block where a ray stands. If the ray stands at a hit where it begins, the box
+/// of active blocks may lie behind.
+ISO_INLINE uint block_behind_stand(const FrameParams *frame, const Ray *ray, BlockCoords b,
+                                   uint side, LastPlanes last) {
+  return is_at_hit(side) && !is_in_box(frame, (int)b.x, (int)b.y, (int)b.z)
+             ? first_block(frame, ray)
+             : block_behind(frame, ray, b, last);
+}
+
 /// find_blocks() for a ray that stands at block *block_id. A ray with a side, or at a hit, which
-/// may be a cap, looks into this block even if the block is not active.
+/// may be a cap or at a border, looks into this block even if the block is not active.
 ISO_LONG uint find_blocks_from(const FrameParams *frame, global const uint *macrocell_masks,
                                const Ray *ray, uint side, uint *block_id, uint wanted,
                                ISO_SCRATCH uint *found) {
@@ -142,7 +151,8 @@ ISO_LONG uint find_blocks_from(const FrameParams *frame, global const uint *macr
   if (has_side(side) || is_at_hit(side)) {
     found[0] = *block_id;
     first = 1;
-    *block_id = block_behind(frame, ray, block_coords(frame, *block_id), last_planes(frame));
+    *block_id =
+        block_behind_stand(frame, ray, block_coords(frame, *block_id), side, last_planes(frame));
     if (wanted == 1 || *block_id == ISO_INVALID_ID) return 1;
   }
   return first + find_blocks(frame, macrocell_masks, ray, block_id, wanted - first,

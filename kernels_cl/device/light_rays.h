@@ -4,17 +4,21 @@
 
 #include "portable/clip.h"
 
+/// The size of the voxels of a ray's level of detail [voxels of the finest that draws].
+ISO_INLINE float voxel_in_first(GivenRay given) {
+  return (float)(1u << level_of_given(given));
+}
+
 /// The size of the voxels of a ray's level of detail [voxels of the finest level].
 ISO_INLINE float voxel_of(uint first_level, GivenRay given) {
-  return (float)(1u << first_level) * (float)(1u << given.level);
+  return (float)(1u << first_level) * voxel_in_first(given);
 }
 
 /// Has a ray met what is clipped?
 ISO_INLINE int meets_clipped(const FrameParams *frame, global const ClipParams *clip,
                              uint first_level, GivenRay given, HitRecord met) {
-  const float in_first = (float)(1u << given.level);
   return is_clipped(clip, given, voxel_of(first_level, given),
-                    met.t / (frame->view.t_scale * in_first));
+                    met.t / (frame->view.t_scale * voxel_in_first(given)));
 }
 
 /// Has a ray met a surface that is drawn?

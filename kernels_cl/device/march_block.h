@@ -235,8 +235,11 @@ ISO_LONG HitRecord hit_of(const FrameParams *frame, global const ClipParams *cli
       changes_at_border(found) ? 0.0f : refine(solver, found->change.cubic, found->change.bracket);
   HitRecord hit = make_hit(frame, ray, found->w, found->at.cell.x, found->at.cell.y,
                            found->at.cell.z, found->at.enter, ray_exit(ray, found->at.exit), s);
-  if (changes_at_border(found) && begins_at_cap(clip, ray)) cap_hit(clip, ray, &hit);
-  if (ISO_BEHIND_HITS) hit.cell |= found->number << ISO_CROSSING_BIT;
+  if (changes_at_border(found)) {
+    mark_beginning(clip, ray, &hit);
+  } else if (ISO_BEHIND_HITS) {
+    hit.cell |= found->number << ISO_CROSSING_BIT;
+  }
   return hit;
 }
 

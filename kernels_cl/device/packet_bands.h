@@ -145,7 +145,7 @@ ISO_SELDOM int hit_at_border(const PacketField *field, const FrameParams *frame,
   if (!open_cell(field, frame, cell, w)) return 0;
   HitRecord found =
       make_hit(frame, ray, w, x, y, z, ray_begin(ray), ray_exit(ray, walk_exit(&walk, ray)), 0.0f);
-  if (begins_at_cap(clip, ray)) cap_hit(clip, ray, &found);
+  mark_beginning(clip, ray, &found);
   *hit = found;
   return 1;
 }

@@ -41,8 +41,8 @@ ISO_INLINE int has_ray(global const GivenRay *given, uint pixel) {
 
 /// `frame`: that of the level of detail in which the ray with this number begins.
 #if ISO_GIVEN_RAYS && ISO_LEVELS
-#define ISO_FIRST_FRAME_OF(frame, pixel)                         \
-  const FrameParams frame##_params = frames[given[pixel].level]; \
+#define ISO_FIRST_FRAME_OF(frame, pixel)                                   \
+  const FrameParams frame##_params = frames[level_of_given(given[pixel])]; \
   const FrameParams *frame = &frame##_params
 #else
 #define ISO_FIRST_FRAME_OF(frame, pixel) const FrameParams *frame = &frame_params

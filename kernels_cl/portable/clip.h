@@ -69,26 +69,43 @@ ISO_INLINE void cap_hit(ISO_GLOBAL const ClipParams *clip, const Ray *ray, HitRe
   hit->grad_z = plane->grad_z;
 }
 
+/// Marks a hit where a ray begins: on a cap, or at a border between levels of detail.
+ISO_INLINE void mark_beginning(ISO_GLOBAL const ClipParams *clip, const Ray *ray, HitRecord *hit) {
+  if (begins_at_cap(clip, ray)) {
+    cap_hit(clip, ray, hit);
+  } else {
+    hit->cell |= ISO_AT_BORDER;
+  }
+}
+
 ISO_INLINE int is_cap(HitRecord hit) {
   return ISO_CLIP && hit.t != INFINITY && (hit.cell & ISO_CAP) != 0;
 }
 
-/// How far along a light ray it enters the half spaces of all planes: those of the surfaces that
-/// are clipped, which the surface with its hit need not be. 0: it begins there. A ray that never
-/// enters gets to where is_clipped() finds that it has left.
+/// Where a light ray enters the half spaces of all planes: those of the surfaces that are clipped,
+/// which the surface with its hit need not be.
+typedef struct RayEntrance {
+  float begin;  ///< how far along the ray; 0: it begins there
+  int plane;    ///< by which it enters, or ISO_NOT_CUT
+} RayEntrance;
+
+/// A ray that never enters gets to where is_clipped() finds that it has left.
 ///
 /// given  in the index space of a level of detail
 /// voxel  its voxels' size [voxels of the finest level]
-ISO_INLINE float entry_of(ISO_GLOBAL const ClipParams *clip, GivenRay given, float voxel) {
-  float begin = 0.0f;
+ISO_INLINE RayEntrance entrance_of(ISO_GLOBAL const ClipParams *clip, GivenRay given, float voxel) {
+  RayEntrance at = {0.0f, ISO_NOT_CUT};
   for (uint i = 0; i < clip->num_planes; ++i) {
     ISO_GLOBAL const PlaneParams *p = &clip->planes[i];
     const float d = fma(p->grad_x, given.d_x, fma(p->grad_y, given.d_y, p->grad_z * given.d_z)),
                 o = fma(p->grad_x, given.o_x, fma(p->grad_y, given.o_y, p->grad_z * given.o_z));
     const float t = d > 0.0f ? -(o + p->first_voxel / voxel) / d : 0.0f;
-    begin = t > begin ? t : begin;
+    if (t > at.begin) {
+      at.begin = t;
+      at.plane = (int)i;
+    }
   }
-  return begin;
+  return at;
 }
 
 /// The ray from a place on its way on.
@@ -99,19 +116,23 @@ ISO_INLINE GivenRay ray_from(GivenRay given, float begin) {
   return given;
 }
 
-/// t of a hit of that ray, if rays of the finest level that draws begin there.
-ISO_INLINE float t_from(const FrameParams *frame, float t, float begin) {
-  return fma(-begin, frame->view.t_scale, t);
+/// t of a hit of that ray, if it begins there.
+///
+/// t_scale  View::t_scale of the ray's level of detail
+ISO_INLINE float t_from(float t_scale, float t, float begin) {
+  return fma(-begin, t_scale, t);
 }
 
-/// The ray from where it enters: see entry_of().
-ISO_INLINE GivenRay entering(ISO_GLOBAL const ClipParams *clip, GivenRay given, float voxel) {
-  return ray_from(given, entry_of(clip, given, voxel));
+/// The ray from where it enters: see entrance_of(). If there are caps, it begins at one: what is
+/// inside a surface there stops it.
+ISO_INLINE GivenRay entering(ISO_GLOBAL const ClipParams *clip, GivenRay given, RayEntrance at) {
+  given = ray_from(given, at.begin);
+  return clip->with_caps != 0 ? cut_by_plane(given, at.plane) : given;
 }
 
 /// Has a ray that begins in front of all planes, or is entering(), left their half spaces at t?
 ///
-/// given, voxel  as of entry_of()
+/// given, voxel  as of entrance_of()
 ISO_INLINE int is_clipped(ISO_GLOBAL const ClipParams *clip, GivenRay given, float voxel, float t) {
   int behind = 0;
   for (uint i = 0; i < clip->num_planes; ++i) {

@@ -184,10 +184,29 @@ ISO_INLINE Ray make_whole_ray(RayAxis x, RayAxis y, RayAxis z) {
   return r;
 }
 
+/// The level of detail that a ray of a list goes through: which of those that draw the frame, 0:
+/// the finest of them.
+ISO_INLINE uint level_of_given(GivenRay given) {
+  return given.level & 0xFFu;
+}
+
+/// The clipping plane at whose cap the ray begins, or ISO_NOT_CUT.
+ISO_INLINE int cut_of_given(GivenRay given) {
+  return (int)(given.level >> 8) - 1;
+}
+
+/// The ray, cut by that plane.
+ISO_INLINE GivenRay cut_by_plane(GivenRay given, int plane) {
+  given.level = level_of_given(given) | (uint)(plane + 1) << 8;
+  return given;
+}
+
 /// A ray of a list, of a whole volume.
 ISO_INLINE Ray make_given_ray(GivenRay given) {
-  return make_whole_ray(make_ray_axis(given.o_x, given.d_x), make_ray_axis(given.o_y, given.d_y),
-                        make_ray_axis(given.o_z, given.d_z));
+  Ray ray = make_whole_ray(make_ray_axis(given.o_x, given.d_x), make_ray_axis(given.o_y, given.d_y),
+                           make_ray_axis(given.o_z, given.d_z));
+  ray.cut_by = cut_of_given(given);
+  return ray;
 }
 
 /// "There is no ray."

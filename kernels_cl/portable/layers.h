@@ -72,10 +72,11 @@ ISO_INLINE int goes_on(RayColor c) {
   return c.transmittance >= ISO_LEAST_TRANSMITTANCE;
 }
 
-/// The number of crossings of its surface in its cell up to a hit, itself included; of a cap, which
-/// is no crossing, 0.
+/// The number of crossings of its surface in its cell up to a hit, itself included. Caps and hits
+/// at borders, where their rays begin in the cell, are no crossings: 0.
 ISO_INLINE uint crossings_up_to_cell(uint hit_cell) {
-  return (hit_cell & ISO_CAP) != 0 ? 0u : (hit_cell >> ISO_CROSSING_BIT & 3u) + 1u;
+  return (hit_cell & ISO_CAP) != 0 ? 0u
+                                   : (hit_cell + (1u << ISO_CROSSING_BIT)) >> ISO_CROSSING_BIT & 3u;
 }
 ISO_INLINE uint crossings_up_to(HitRecord hit) {
   return crossings_up_to_cell(hit.cell);
@@ -95,8 +96,21 @@ ISO_INLINE int is_of_slice(ISO_GLOBAL const LayerParams *layers, HitRecord hit) 
   return hit.t != INFINITY && surface_of(hit) >= layers->num_surfaces;
 }
 
+/// Is a ray at t in the band of a level of detail? The border belongs to the level behind it.
+ISO_INLINE int is_in_band(const FrameParams *frame, float t) {
+#if defined(__OPENCL_C_VERSION__) && !ISO_LEVELS
+  (void)frame;
+  (void)t;
+  return 1;
+#else
+  return t >= frame->band.begin_t && t < frame->band.end_t;
+#endif
+}
+
 /// Where a ray of the camera meets a slice: the plane's gradient, in a cell of the grid. No hit
-/// outside the grid, in a block of another brick, or in what is clipped.
+/// outside the grid or the level's band, in a block of another brick, or in what is clipped.
+///
+/// frame  of a level of detail
 ISO_INLINE HitRecord slice_hit(const FrameParams *frame, ISO_GLOBAL const ClipParams *clip,
                                ISO_GLOBAL const LayerParams *layers, uint slice, uint ray_id) {
   const RayOfView view = ray_of_view(&frame->view, ray_id);
@@ -111,7 +125,7 @@ ISO_INLINE HitRecord slice_hit(const FrameParams *frame, ISO_GLOBAL const ClipPa
   if (along.d == 0.0f) return hit;
   t = plane_t(along, 0.0f).hi;
   if ((layers->whole_slices >> slice & 1u) == 0) clip_ray(frame, clip, ray_id, &ray);
-  if (!(t >= ray.begin_t && t <= ray.end_t && t < INFINITY)) return hit;
+  if (!(t >= ray.begin_t && t <= ray.end_t && t < INFINITY) || !is_in_band(frame, t)) return hit;
   x = field_cell(fma(t, ray.x.d, ray.x.o), ray.x.origin, frame->grid.dims_x, &hit.x);
   y = field_cell(fma(t, ray.y.d, ray.y.o), ray.y.origin, frame->grid.dims_y, &hit.y);
   z = field_cell(fma(t, ray.z.d, ray.z.o), ray.z.origin, frame->grid.dims_z, &hit.z);
@@ -130,7 +144,7 @@ ISO_INLINE HitRecord slice_hit(const FrameParams *frame, ISO_GLOBAL const ClipPa
   return hit;
 }
 
-/// A ray's nearest hit on slices that it has not passed yet.
+/// A ray's nearest hit in a level of detail on slices that it has not passed yet.
 ///
 /// passed  bit i: slice i
 ISO_INLINE HitRecord nearest_slice(const FrameParams *frame, ISO_GLOBAL const ClipParams *clip,

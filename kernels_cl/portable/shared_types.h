@@ -296,6 +296,9 @@ ISO_CHECK_SIZE(BlockRays, 8);
 /// HitRecord::cell has the number of the crossing in its cell from this bit on: 0..2. Only rays
 /// that have gone on from a hit (layers.h) have others than the first.
 #define ISO_CROSSING_BIT 7
+/// Instead of that number, of a hit at a border between levels of detail, which is no crossing: one
+/// of the levels has the ray inside there, and the other one outside.
+#define ISO_AT_BORDER (3u << ISO_CROSSING_BIT)
 #define ISO_SURFACE_BIT 9   ///< and the number of the surface from this one on
 #define ISO_MAX_SURFACES 8  ///< of a frame
 #define ISO_MAX_LAYERS 16   ///< hits of a ray that are drawn
@@ -317,7 +320,7 @@ ISO_CHECK_SIZE(HitRecord, 36);
 typedef struct GivenRay {
   float o_x, o_y, o_z;  ///< index space of its level of detail
   float d_x, d_y, d_z;  ///< [voxels of the level per t]
-  uint level;           ///< which of those that draw the frame, 0: the finest of them
+  uint level;           ///< see level_of_given(), cut_of_given()
 } GivenRay;
 ISO_CHECK_SIZE(GivenRay, 28);
 

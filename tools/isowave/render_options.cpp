@@ -136,7 +136,7 @@ void check_slice_options(const CLI::App &command, const RenderArgs &options) {
   if (num_surfaces + num_slices > ISO_MAX_SURFACES)
     throw Error("{} surfaces and {} slices are more than a frame can have: give at most {}",
                 num_surfaces, num_slices, ISO_MAX_SURFACES);
-  refuse_options(command, {"--voxel-pixels", "--max-image-error", "--time-budget"},
+  refuse_options(command, {"--max-image-error", "--time-budget"},
                  "--slice draws without it: leave out either");
   if (options.renderer_flags.pipeline == "blocks")
     refuse_options(command, {"--slice"}, "--pipeline blocks draws one opaque surface");
@@ -180,7 +180,7 @@ void check_surface_options(const CLI::App &command, const RenderArgs &options, c
   refuse_options(command, {"--isovalue"},
                  "draws pictures of one surface each, --surface one of all: leave out either");
   refuse_options(command, {"--color"}, "surfaces have colours of their own: --surface VALUE,COLOR");
-  refuse_options(command, {"--voxel-pixels", "--max-image-error", "--time-budget"},
+  refuse_options(command, {"--max-image-error", "--time-budget"},
                  "--surface draws without it: leave it out, or draw one surface by --isovalue");
   check_light_rays(options);
   if (options.renderer_flags.pipeline == "blocks")

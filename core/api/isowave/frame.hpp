@@ -173,12 +173,13 @@ struct FrameRequest {
   /// back: what lies behind translucent surfaces is seen through them. At most 16 crossings of a
   /// ray are drawn (FrameStatistics::rays_cut). Empty: the surface of `isovalue` alone, opaque, in
   /// appearance.surface. A device needs RendererOptions::with_surfaces. Not with bound,
-  /// voxel_pixels, max_image_error and time_budget_ms. Errors are those of a ray's first hit,
-  /// whatever its opacity. That of a slice is rounding alone. Labels have no errors.
+  /// max_image_error and time_budget_ms. Errors are those of a ray's first hit, whatever its
+  /// opacity. That of a slice is rounding alone. Labels have no errors, and one level of detail.
   std::vector<Surface> surfaces{};
   /// Slices beside `surfaces`, or beside that of `isovalue`: up to 8 with the surfaces, blended
   /// with them, with their conditions. A slice counts as a crossing, is in front of a surface at
-  /// the same place, and has the plane's normal.
+  /// the same place, and has the plane's normal. It shows the voxels of the level of detail that
+  /// is drawn at its distance.
   std::vector<Slice> slices{};
 
   /// Largest distance between voxels of a coarser level of detail [pixels]; 0: the finest level

@@ -380,8 +380,8 @@ class Renderer:
             open. A `max_error` by proof and the output "bounds" need whole surfaces.
         surfaces
             Up to 8 surfaces in one picture, instead of `isovalue` and `color`: see Surface. Needs
-            surfaces= of the constructor; not with voxel_pixels, max_image_error, time_budget;
-            labels not with max_error. Errors are those of each ray's first hit. Rays of `ambient`
+            surfaces= of the constructor; not with max_image_error, time_budget; labels not with
+            voxel_pixels, max_error. Errors are those of each ray's first hit. Rays of `ambient`
             and shadows end at those of opacity 1.
         slices, slice_map
             Planes that show the voxels beside the surfaces, see Slice: up to 8 with them, with

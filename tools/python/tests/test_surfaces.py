@@ -200,7 +200,6 @@ def test_surfaces_that_cannot_be_drawn_are_refused(ball: isowave.Volume) -> None
     refuse("color: surfaces have colours of their own", color="red")
     glass = [Surface(0, opacity=0.5), Surface(1, opacity=0.9)]
     refuse("end at surfaces of opacity 1, and there is none", glass, ambient=1)
-    refuse("leave out voxel_pixels", voxel_pixels=1)
     refuse("leave out max_image_error", max_image_error=0.1)
     refuse("leave out time_budget_ms", time_budget=1)
     refuse("errors are bounded of whole surfaces", outputs=("bounds",), clip=[HALF])
