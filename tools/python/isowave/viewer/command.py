@@ -130,6 +130,8 @@ def make_parser() -> argparse.ArgumentParser:
     add("--no-data", type=float, help="value of voxels without data, beside NaN")
     add("--dataset", metavar="NAME", help="which array of a file that has several, or which level")
     add("--index", metavar="AXIS=N,...", help="entries of further axes, counted from 0: t=3,c=0")
+    add("--field-dataset", metavar="NAME", help="--dataset of the field's file")
+    add("--field-index", metavar="AXIS=N,...", help="--index of the field's file")
     add("--host", default="127.0.0.1", help="address to listen at; traffic is not encrypted")
     add("--port", type=int, default=0, help="port to listen at; 0: a free one")
     add("--max-clients", type=int, default=16, help="most clients at the same time")
@@ -188,7 +190,7 @@ def series_of(names: Sequence[str], given: dict[str, Any]) -> Series | None:
         return None
     with warnings.catch_warnings(record=True) as noted:
         series = open_series(names if len(names) > 1 else name, **given)
-    if len(series) == 1 and not is_pattern:
+    if len(series) == 1 and len(names) == 1 and not is_pattern:
         return None  # opening the volume warns of the same
     for warning in noted:
         warnings.warn(warning.message)
@@ -245,7 +247,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         if series is not None and of_field not in ("", "volume"):
             raise ValueError("a series has no second volume to colour by: name one of its steps")
         # The field comes first: if it cannot be opened, the volume need not be compressed.
-        field = None if of_field in ("", "volume") else open_field(of_field, given)
+        own = {"dataset": arguments.field_dataset, "index": arguments.field_index}
+        own = {name: each for name, each in own.items() if each is not None}
+        if own and of_field in ("", "volume"):
+            raise ValueError(f"--field-{next(iter(own))}: give --field, or leave it out")
+        field = None if of_field in ("", "volume") else open_field(of_field, given, **own)
         volume = open_volume(names[0], **given) if series is None else series
         server = serve(
             volume,
