@@ -10,6 +10,7 @@
 
 #include "core/bricks/brick_volume.hpp"
 #include "core/bricks/team_renderer.hpp"
+#include "core/view/detail.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/test_devices.hpp"
 #include "tests/thread_meeting.hpp"
