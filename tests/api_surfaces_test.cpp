@@ -193,7 +193,6 @@ TEST(ApiSurfaces, BadRequestsAreOneLine) {
   refuse("an opacity of nan", [](Request &r) { r.surfaces[0].opacity = float(kNan); });
   refuse("a colour of 1.5 is", [](Request &r) { r.surfaces[0].color[2] = 1.5f; });
   refuse("leave out bound", [](Request &r) { r.bound = FieldBound::kLower; });
-  refuse("leave out voxel_pixels, or draw", [](Request &r) { r.voxel_pixels = 1; });
   refuse("end at surfaces of opacity 1, and there is none", [](Request &r) {
     r.ambient_rays = 1;
     for (Surface &surface : r.surfaces) surface.opacity = 0.5f;
