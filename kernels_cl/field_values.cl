@@ -32,9 +32,9 @@ ISO_LONG float cached_value(global const FieldMap *map, global const uint *label
 ///               ISO_FIELD_OWN_LABELS
 /// begins  1: all hits. 0: the hits of the list
 /// prev    counts of the pass before
-/// In      map [num_frames], or [1] if ISO_LEVELS is 0; hits [pixel]; active_ray_ids
-/// [prev->next_active_count], unless it begins Out     field_values [pixel] of hits on the map's
-/// surfaces;
+/// In      map [num_frames], or [1] if ISO_LEVELS is 0; hits [pixel];
+///         active_ray_ids [prev->next_active_count], unless it begins
+/// Out     field_values [pixel] of hits on the map's surfaces;
 ///         next_active_ray_ids [counts->next_active_count]: the
 ///         rays that wait. The first counts->window_count of them ask for blocks of the field:
 ///         request_block_ids [counts->requested_count, at most capacity]; slot_stamps of the blocks
