@@ -26,7 +26,7 @@ struct LayersInput {
     const std::vector<SurfaceStyle> surfaces{{.isovalue = 1, .opacity = 0.3f},
                                              {.isovalue = 2, .opacity = 0.3f}};
     layers.open(surfaces, make_layer_params(surfaces, {}, volume.info, rays.frame.view, camera),
-                light);
+                light, rays.frame);
     for (std::size_t place = 0; place < 2; ++place) {
       std::vector<HitRecord> hits(size.num_rays(), no_hit());
       for (std::size_t i = place; i < hits.size(); i += 2) {
