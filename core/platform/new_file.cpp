@@ -73,8 +73,8 @@ void keep_permissions(const fs::path &replaced, std::FILE *file) {
     mode &= ~static_cast<mode_t>(S_IRWXG);  // they would be the rights of another group
   // Only root can give a file away: an ordinary user becomes the owner.
   if (old.st_uid != made.st_uid && ::fchown(descriptor, old.st_uid, kSameGroup) != 0) errno = 0;
-    // Before the mode, which then also limits what the list grants.
 #ifdef __linux__
+  // Before the mode, which then also limits what the list grants.
   constexpr const char *kAccessList = "system.posix_acl_access";
   std::array<char, 1 << 12> list{};
   const ssize_t length = ::getxattr(replaced.c_str(), kAccessList, list.data(), list.size());
