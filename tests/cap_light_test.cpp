@@ -13,6 +13,7 @@
 #include "core/host/host_renderer.hpp"
 #include "core/render/device_renderer.hpp"
 #include "reference/twin_renderer.hpp"
+#include "tests/array_reader.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/test_devices.hpp"
 
@@ -182,18 +183,30 @@ TEST_P(CapLightOnDevice, IsTheTwins) {
   expect_as_the_twin(renderer, volume, {33, 25});
 }
 
-/// Small enough for Oclgrind.
+/// Small enough for Oclgrind: a ball in a corner, and a floor that is whole.
 TEST_P(CapLightOnDevice, SmallFrames) {
-  const CompressedVolume volume = ball_above_floor();
-  constexpr ImageSize kSmall{8, 6};
+  const VolumeInfo info = test::grid_info({13, 12, 14});
+  ArrayReader reader(
+      info, test::sample(info.dims, [](const glm::dvec3 &at) {
+        const double ball = 4 - glm::length(at - glm::dvec3(6, 6, 9)), floor = 3.2 - at.z;
+        return std::clamp(0.5 + 0.3 * ball, 0.0, 1.0) - std::clamp(0.5 + 0.3 * floor, 0.0, 1.0);
+      }));
+  const CompressedVolume volume = compress(reader, {.rate = 20});
+  constexpr ImageSize kSmall{7, 5};
   DeviceRenderer renderer(device_, volume,
                           {.size = kSmall, .max_surfaces = 2, .with_given_rays = true});
   TwinRenderer twin(volume, kSmall);
-  const FrameRequest request = scene(true, kSmall);
-  renderer.render(request);
+  FrameRequest request = scene(true, kSmall);
+  request.camera = {{6, -15, 14}, {6, 6, 3.2}, {0, 0, 1}, 30};
+  request.clip.planes = {{{0, 0, 1}, 8}, {{0, 0, -2}, -20}};
   twin.render(request);
+  const Image8 capped = twin.shade(request.light);
+  renderer.render(request);
   expect_same_hits(renderer.hits(), twin.hits(), kSmall.width);
-  EXPECT_EQ(renderer.shade(request.light).pixels, twin.shade(request.light).pixels);
+  EXPECT_EQ(renderer.shade(request.light).pixels, capped.pixels);
+  request.clip.caps = false;
+  twin.render(request);
+  EXPECT_NE(twin.shade(request.light).pixels, capped.pixels) << "no cap stops a ray";
 }
 
 }  // namespace
