@@ -19,11 +19,10 @@ using Vec = std::array<double, 3>;
 using Field = std::function<double(double x, double y, double z)>;
 
 Ray make_ray_from(const Vec &origin, const Vec &direction) {
-  Ray ray;
-  ray.x = make_ray_axis(static_cast<float>(origin[0]), static_cast<float>(direction[0]));
-  ray.y = make_ray_axis(static_cast<float>(origin[1]), static_cast<float>(direction[1]));
-  ray.z = make_ray_axis(static_cast<float>(origin[2]), static_cast<float>(direction[2]));
-  return ray;
+  const auto axis = [&](int i) {
+    return make_ray_axis(static_cast<float>(origin[i]), static_cast<float>(direction[i]));
+  };
+  return make_whole_ray(axis(0), axis(1), axis(2));
 }
 
 /// The ray through `point` along `direction`, starting `distance` before it.
