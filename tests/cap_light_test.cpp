@@ -162,11 +162,6 @@ TEST(CapLight, IsStoppedOnTheHost) {
 
 class CapLightOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
  protected:
-  void SetUp() override {
-    if (is_llvmpipe(GetParam()) && !long_tests())
-      GTEST_SKIP() << "llvmpipe takes minutes to compile the kernels of layers";
-  }
-
   ocl::Device device_{GetParam()};
 };
 INSTANTIATE_TEST_SUITE_P(Devices, CapLightOnDevice, testing::ValuesIn(devices_under_test()),

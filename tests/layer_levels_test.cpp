@@ -220,11 +220,6 @@ void expect_plain(Renderer &renderer, const VolumeInfo &info) {
 
 class LayerLevelsOnDevice : public testing::TestWithParam<ocl::DeviceInfo> {
  protected:
-  void SetUp() override {
-    if (is_llvmpipe(GetParam()) && !long_tests())
-      GTEST_SKIP() << "llvmpipe takes minutes to compile the kernels of layers";
-  }
-
   ocl::Device device_{GetParam()};
 };
 INSTANTIATE_TEST_SUITE_P(Devices, LayerLevelsOnDevice, testing::ValuesIn(devices_under_test()),
