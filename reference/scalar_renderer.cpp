@@ -109,7 +109,8 @@ HitRecord trace_band_from(const FrameParams &frame, const float *voxels, Solver 
   const CellBox domain{glm::ivec3(0), {last.x, last.y, last.z}};
   GridWalk cell = start.cell;
   RayEvent enter = start.enter;
-  std::optional<bool> before = start.before;
+  bool begins_on_side = start.before.has_value();
+  const bool was_inside = start.before.value_or(false);
   for (uint number = start.number; contains(domain, cell); number = 0) {
     RayEvent exit = walk_exit(&cell, &ray);
     const bool ends = !event_before(exit, end);
@@ -123,12 +124,12 @@ HitRecord trace_band_from(const FrameParams &frame, const float *voxels, Solver 
     const auto inside_now = [&](RayEvent event, bool leaving) {
       return inside_at(&ray, w, event, cell.x, cell.y, cell.z, leaving) != 0;
     };
-    if (before && !lacks_data(w) && inside_now(enter, false) != before) {
+    if (begins_on_side && !lacks_data(w) && inside_now(enter, false) != was_inside) {
       HitRecord hit = hit_at(0.0f);
       mark_beginning(&clip, &ray, &hit);
       return hit;
     }
-    before.reset();
+    begins_on_side = false;
     const bool changes =
         number == 0
             ? change_in_cell(solver, &ray, w, cell.x, cell.y, cell.z, enter, exit, &change) != 0
