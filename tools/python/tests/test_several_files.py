@@ -48,5 +48,6 @@ def test_itk_reads_the_same(tmp_path, name, header):
     image = SimpleITK.ReadImage(str(tmp_path / name))
     assert np.array_equal(volume[...], SimpleITK.GetArrayFromImage(image))
     assert np.array_equal(volume[...], VOXELS)
-    assert volume.spacing == pytest.approx(image.GetSpacing()[::-1]) == pytest.approx(SPACING)
+    assert volume.spacing == pytest.approx(image.GetSpacing()[::-1])
+    assert volume.spacing == pytest.approx(SPACING)
     assert volume.origin == pytest.approx(image.GetOrigin()[::-1]) == pytest.approx(ORIGIN)
