@@ -263,6 +263,7 @@ def test_without_a_terminal_there_is_no_bar(volume, monkeypatch):
             calls.append(self)
 
     monkeypatch.setattr(_progress, "TqdmProgress", Noted)
+    monkeypatch.delitem(sys.modules, "ipykernel", raising=False)  # of a test of widgets
     volume.render(6, size=SIZE, device="host")
     assert not calls
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
