@@ -211,6 +211,16 @@ TEST(LayerBounds, AreKeptInRandomScenes) {
   expect_kept(sum, 8);
 }
 
+/// How many first hits lie on slices, whose numbers follow two surfaces', and have exact bounds.
+std::uint64_t count_exact_on_slices(const Judged &judged) {
+  std::uint64_t count = 0;
+  for (std::size_t ray = 0; ray < judged.drawn.size(); ++ray) {
+    const HitRecord &hit = judged.drawn[ray];
+    count += std::isfinite(hit.t) && surface_of(hit) >= 2 && judged.certificate.bounds[ray] < 1e-3f;
+  }
+  return count;
+}
+
 /// Coarser levels are further off. Their slices are where those of the finest level are.
 TEST(LayerBounds, AreKeptAtLevelsOfDetail) {
   const BoundsScene scene({36, 33, 39}, test::gyroid_field(21), {.rate = 12});
@@ -225,11 +235,7 @@ TEST(LayerBounds, AreKeptAtLevelsOfDetail) {
       request.voxel_pixels = voxel_pixels;
       const Judged judged = judge(renderer, scene, request);
       add(sum, judged.tally);
-      for (std::size_t ray = 0; ray < judged.drawn.size(); ++ray) {
-        const HitRecord &hit = judged.drawn[ray];
-        num_on_slices +=
-            std::isfinite(hit.t) && surface_of(hit) >= 2 && judged.certificate.bounds[ray] < 1e-3f;
-      }
+      num_on_slices += count_exact_on_slices(judged);
     }
   }
   EXPECT_EQ(sum.exceeded, 0u);
@@ -249,11 +255,7 @@ TEST(LayerBounds, AreKeptBesideSlices) {
     request.slices = slices_of(scene.volume.info);
     const Judged judged = judge(renderer, scene, request);
     add(sum, judged.tally);
-    for (std::size_t ray = 0; ray < judged.drawn.size(); ++ray) {
-      const HitRecord &hit = judged.drawn[ray];
-      num_on_slices +=
-          std::isfinite(hit.t) && surface_of(hit) >= 2 && judged.certificate.bounds[ray] < 1e-3f;
-    }
+    num_on_slices += count_exact_on_slices(judged);
   }
   expect_kept(sum, 1e3);  // most are of slices, whose error is next to nothing
   EXPECT_GT(num_on_slices, 500u);

@@ -49,7 +49,7 @@ class VoxelFiles {
   /// header  the file that names them, relative to its folder
   /// sizes   of the array's axes, the fastest first
   /// field   for messages
-  /// Throws  Error: these axes cannot be cut into so many files
+  /// Throws  Error: the files cannot share these axes
   VoxelFiles(std::shared_ptr<const InputFile> header, VoxelFileNames names,
              std::span<const std::int64_t> sizes, std::string_view field);
 

@@ -72,7 +72,7 @@ void check_volume_info(const VolumeInfo &info, std::string_view what) {
                   info.dims.z, kMaxDim);
     }
   }
-  // Sizes of memory have so many bits.
+  // Sizes of memory are computed from this count, in std::size_t.
   constexpr std::uint64_t kMaxVoxels = std::numeric_limits<std::size_t>::max() / 8;
   if (const std::uint64_t voxels = info.num_voxels(); voxels > kMaxVoxels) {
     throw Error("{}: {} voxels: this build, whose addresses have {} bits, takes at most {}", what,

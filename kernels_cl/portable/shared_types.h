@@ -45,7 +45,7 @@
 #include <cmath>
 #include <cstdint>
 #if !defined(__GLIBC__) && !defined(__FP_FAST_FMAF)
-#include <kernels_cl/portable/fma_by_double.h>  // no part of kernels, as <> says
+#include <kernels_cl/portable/fma_by_double.h>  // <>: not put into kernels
 #endif
 #define ISO_CHECK_SIZE(T, n) static_assert(sizeof(T) == (n), #T " layout changed")
 #define ISO_NAMESPACE_BEGIN namespace isowave::core {

@@ -1,6 +1,6 @@
 #pragma once
-// Parts of C++20 that libc++ 13 lacks, which Debian's emscripten 3.1.6 has: as far as the library
-// uses them. The compiler includes this file before all others (-include). libc++ 16 has them all.
+// Parts of C++20 that the library uses, and that libc++ 13 lacks. Debian's emscripten 3.1.6 has
+// libc++ 13. The compiler includes this file before all others (-include).
 
 #include <version>
 

@@ -246,7 +246,7 @@ def two_datasets(path):
 
 @pytest.mark.parametrize("name", ["a.h5", "a.nc", "a.zarr"])
 def test_a_field_is_chosen_by_its_name(folder, monkeypatch, name):
-    """In a file of several arrays, of which one is the volume."""
+    """Its file has several arrays. One of them is the volume."""
     monkeypatch.chdir(folder)
     ct, heat = "ct", "heat"
     if name == "a.h5":

@@ -267,7 +267,8 @@ def test_alt_and_drag_and_keys_roll(page: Any) -> None:
 def test_faces_of_the_cube_are_views(open_page: Callable[..., Any], anatomical: bool) -> None:
     """Front, back, left, right, top, bottom: as isowave::orientation_of() has them."""
     sides = {"front": (0, 0, 1), "right": (1, 0, 0), "top": (0, 1, 0)}
-    letters = {"front": "z", "right": "x", "top": "y", "back": "−z", "left": "−x", "bottom": "−y"}
+    letters = {"front": "z", "right": "x", "top": "y"}
+    letters |= {"back": "−z", "left": "−x", "bottom": "−y"}
     if anatomical:
         sides = {"front": (0, -1, 0), "right": (-1, 0, 0), "top": (0, 0, 1)}
         letters = dict(front="A", back="P", right="R", left="L", top="S", bottom="I")
