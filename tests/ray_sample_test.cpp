@@ -16,6 +16,7 @@
 #include "core/base/error.hpp"
 #include "core/host/host_renderer.hpp"
 #include "core/render/device_renderer.hpp"
+#include "core/view/color_maps.hpp"
 #include "kernels_cl/portable/grid_dda.h"
 #include "reference/twin_renderer.hpp"
 #include "tests/frame_scene.hpp"
@@ -421,6 +422,33 @@ TEST(RaySample, NeedsNoErrors) {
   const FrameStats tiny = bounded.render(request_by_sample(camera, {12, 8}, 0.3f, 1));
   EXPECT_EQ(tiny.detail->detail, Detail{}) << "too few rays hit";
   EXPECT_EQ(tiny.detail->sample->lowest, 1);
+}
+
+/// Several surfaces have coarser levels if the first hits of a sample keep the error. Slices stay
+/// the finest.
+TEST(RaySample, SeveralSurfacesHaveOneDetail) {
+  const CompressedVolume volume =
+      levels_of_field({64, 60, 56}, test::gyroid_field(40), {.rate = 16, .measure_error = true});
+  HostRenderer renderer(volume);
+  BoundedRenderer bounded(renderer, volume, volume.rate());
+  const Camera camera = orbit_cameras(volume.info, 1)[0];
+  FrameRequest request = request_by_sample(camera, {160, 120}, 0.3f, 2);
+  request.normals = Normals::kCell;
+  const Detail of_one = bounded.render(request).detail->detail;
+  request.surfaces = {{0.3f, {0.9f, 0.9f, 0.2f}}};
+  EXPECT_EQ(bounded.render(request).detail->detail, of_one) << "one opaque surface";
+  request.surfaces = {{0.3f, {0.9f, 0.9f, 0.2f}, 0.4f}, {0.6f, {0.1f, 0.4f, 0.8f}}};
+  const DetailChoice choice = bounded.render(request).detail.value();
+  ASSERT_GT(choice.detail.voxel_pixels, 0);
+  EXPECT_GE(choice.sample.value().lowest, kSampledShare);
+  EXPECT_GE(share_of_frame(renderer, without_error(request), choice.detail, 2), kSampledShare);
+  FrameRequest strict = request;
+  strict.max_surface_error = 0.25;
+  EXPECT_LT(bounded.render(strict).detail->detail.voxel_pixels, choice.detail.voxel_pixels)
+      << "a judge that always says yes";
+  FrameRequest sliced = request;
+  sliced.slices = {{{{{1, 0, 0}, camera.at.x}, 1.0f}}, -1, 1, color_map("viridis")};
+  EXPECT_EQ(bounded.render(sliced).detail->detail.voxel_pixels, 0);
 }
 
 TEST(RaySample, BadRequestsAreOneLine) {

@@ -236,10 +236,10 @@ DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, d
         numbers, [&](double number) { return !judge.keeps(detail_of(number)); });
     return found == numbers.end() ? 0.0 : *found;
   };
-  // Beside voxels without data, coarser levels have no bound. Several surfaces have the finest
-  // alone.
-  if (choice.reachable && abilities.levels && levels.size() > 1 && request.surfaces.empty() &&
-      (by_sample || volume.no_data.empty())) {
+  // Beside voxels without data, coarser levels have no bound. Slices have the finest alone: places
+  // say nothing of the values that they show.
+  if (choice.reachable && abilities.levels && levels.size() > 1 &&
+      (by_sample || volume.no_data.empty()) && request.slices.planes.empty()) {
     const double coarsest = first_to_suffice(all_voxel_pixels(), [](double voxel_pixels) {
       return Detail{voxel_pixels, 0};
     });

@@ -37,9 +37,9 @@ inline constexpr double kMinPlaneRate = 16;
 /// by sample  with which the hits keep max_surface_error against full detail (suffices()); needs no
 ///            bounds, and takes any solver
 ///
-/// Levels are skipped if they save too few blocks (kMaxBlocksShare); bit planes are kept for
-/// volumes below kMinPlaneRate bits a voxel. All ranks of a team choose what rank 0 finds. Throws
-/// Error as certify() does, by proof.
+/// The first hit of each ray is judged. Levels are skipped beside slices, and if they save too few
+/// blocks (kMaxBlocksShare); bit planes are kept for volumes below kMinPlaneRate bits a voxel. All
+/// ranks of a team choose what rank 0 finds. Throws Error as certify() does, by proof.
 DetailChoice choose_detail(Renderer &renderer, const CompressedVolume &volume, double rate,
                            const FrameRequest &request, double max_surface_error,
                            Evidence by = Evidence::kProof, std::span<const Camera> series = {});
