@@ -37,7 +37,7 @@ quietly "$python" -m pip install --quiet --force-reinstall --no-deps "$wheel"
 "$python" -m mypy --config-file "$source/pyproject.toml" --cache-dir "$work/mypy" \
   "$source/tools/python/isowave"
 cd "$work"  # not among the sources, whose folder has no compiled part
-ISOWAVE_PROGRAM=$program "$python" -m pytest -q -p no:cacheprovider "$tests"
+ISOWAVE_PROGRAM=$program "$python" -m pytest -q -p no:cacheprovider --durations 40 "$tests"
 
 # On a machine without any OpenCL: PoCL comes from PyPI, the loader with the wheel.
 if ! unshare --mount true 2> /dev/null; then

@@ -333,7 +333,7 @@ double share_of_frame(Renderer &renderer, const FrameRequest &request, const Det
 TEST(RaySample, PromiseHoldsInRandomScenes) {
   constexpr ImageSize kSize{320, 240};
   ASSERT_GT(sample_of(kSize).stride, 1u);
-  const int num_volumes = std::getenv("ISOWAVE_LONG_TESTS") != nullptr ? 10 : 4;
+  const int num_volumes = std::getenv("ISOWAVE_LONG_TESTS") != nullptr ? 10 : 2;
   int num_kept = 0, num_coarse = 0, num_lost_always = 0;
   Random random{std::mt19937(1)};
   for (int volumes = 0; volumes < num_volumes; ++volumes) {
