@@ -317,9 +317,9 @@ TEST_P(CompressOnDevice, RefusesAndMapsAsTheHost) {
 
   voxels.back() = kMaxMagnitude;
   ArrayReader too_large(dims, voxels);
-  EXPECT_THAT(
-      [&] { compress(too_large, options); },
-      ThrowsMessage<Error>(AllOf(HasSubstr("1 of 4680000 voxels"), HasSubstr("x=599, y=599, z=12"))));
+  EXPECT_THAT([&] { compress(too_large, options); },
+              ThrowsMessage<Error>(
+                  AllOf(HasSubstr("1 of 4680000 voxels"), HasSubstr("x=599, y=599, z=12"))));
   options.rate = 33;
   EXPECT_THROW(compress(reader, options), Error);
   EXPECT_EQ(device_.ledger().current(), 0u);
