@@ -260,21 +260,22 @@ def drawn_by_others(run, volume, isovalue, options):
     if run.options.on_cpu:
         program, chosen = "bench/peer_bench", {"sides": "mesh_low"}
         arguments = ("--volume", volume)
-    if not (run.options.programs / program).exists():
-        return {}
     shown = {name: value for name, value in options.items() if name != "ways"}
+    shown |= {"isovalue": isovalue, "pictures": "peers", "json": "peers/p.json"}
     (run.work / "peers").mkdir(exist_ok=True)
-    run.run(
-        program,
-        *arguments,
-        isovalue=isovalue,
-        **shown,
-        **chosen,
-        pictures="peers",
-        json="peers/p.json",
-    )
-    document = run.read_json("peers/p.json")
-    others = [p for p in document["pareto_peers"] if not p["side"].startswith("isowave")]
+    others = []
+    if (run.options.programs / program).exists():
+        run.run(program, *arguments, **shown, **chosen)
+        others += run.read_json("peers/p.json")["pareto_peers"]
+    if run.options.python and not is_large:
+        name = str(volume)
+        if name.startswith("generate:"):  # the package reads files
+            name = run.volume(name[9:].removesuffix("_uint8"), "--exact")
+        run.run_python(TOP / "bench/vtk_peer", name, **shown)
+        others += run.read_json("peers/p.json")["pareto_peers"]
+    others = [peer for peer in others if not peer["side"].startswith("isowave")]
+    if not others:
+        return {}
     (run.work / "peers" / "others.json").write_text(json.dumps({"pareto_peers": others}))
     return {"peers": "peers/others.json"}
 

@@ -98,14 +98,22 @@ class Run:
         ranks        started by mpirun, so many times
         environment  variables beside those of this process
         """
-        path = self.options.programs / program
         mpirun = (
             ["mpirun", "--oversubscribe", "--bind-to", "none", "-n", str(ranks)] if ranks else []
         )
         if remember:
             self.remember(program, *arguments, mpirun=mpirun, environment=environment, **options)
+        path = str(self.options.programs / program)
+        return self._output([*mpirun, path], program, arguments, environment, options)
+
+    def run_python(self, script, *arguments, **options):
+        """The same of a script for the Python of --python."""
+        self.remember(script, *arguments, **options)
+        return self._output([self.options.python, str(script)], script.name, arguments, {}, options)
+
+    def _output(self, command, program, arguments, environment, options):
         arguments = [*map(str, arguments), *as_arguments(options)]
-        command = [*mpirun, str(path), *arguments]
+        command = [*command, *arguments]
         variables = os.environ | environment
         done = subprocess.run(command, cwd=self.work, env=variables, capture_output=True, text=True)
         if done.returncode:
