@@ -19,9 +19,9 @@ using testing::HasSubstr;
 const std::string kFuel = ISOWAVE_TEST_DATA "/fuel_64x33x32_uint8.raw.gz";
 
 const std::vector<std::string> kCommands = {
-    "devices",    "info",          "generate",     "convert",        "render",
-    "extract",    "compare",       "verify",       "bench",          "man",
-    "completion", "bench solvers", "bench pareto", "bench topology", "bench paper"};
+    "devices",       "info",         "generate",       "convert",    "render", "export",
+    "extract",       "compare",      "verify",         "bench",      "man",    "completion",
+    "bench solvers", "bench pareto", "bench topology", "bench paper"};
 
 /// The long names of options that --help of a command lists.
 std::set<std::string> options_of(const std::string &command) {

@@ -17,12 +17,16 @@ quietly() {
 
 mkdir -p "$work"
 rm -rf "$work/dist"
+# The test wasm has made it.
+export ISOWAVE_PAGE=$build/wasm/install/share/isowave/page.html.gz
 quietly "$source/tools/wheel" -o "$work/dist" /usr/bin/python3
 wheel=$(echo "$work"/dist/isowave-*.whl)
 tag=$(/usr/bin/python3 -c 'import sys; v = "cp%d%d" % sys.version_info[:2]
 print("cp312-abi3" if sys.version_info >= (3, 12) else f"{v}-{v}")')
 [[ $wheel == *-$tag-manylinux_* ]] || fail "$wheel is not for $tag"
-[ "$(stat -c %s "$wheel")" -lt 2200000 ] || fail "the wheel has $(stat -c %s "$wheel") bytes"
+unzip -l "$wheel" | grep -q isowave/page.html.gz || fail 'the wheel has no engine for pages'
+unset ISOWAVE_PAGE
+[ "$(stat -c %s "$wheel")" -lt 2800000 ] || fail "the wheel has $(stat -c %s "$wheel") bytes"
 unzip -l "$wheel" | grep -iE 'embree|gmp|itk|gomp' &&
   fail 'the wheel has what a renderer does not need'
 

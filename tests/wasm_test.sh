@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # wasm_test.sh <source folder> <build folder> <program>: the library that tools/wasm builds reads,
 # compresses, draws and extracts under node with the bits of the program, which does so on a device.
+# A page's engine draws rows and pictures with them.
 set -euo pipefail
 source=$1 build=$2 program=$3
 work=$(mktemp -d)
@@ -43,6 +44,18 @@ same_bits() { # same_bits VOLUME ISOVALUE
     cmp "$work/wasm/$file" "$work/native/$file" || fail "$1: $file of WebAssembly is another"
   done
 }
+# A page's worker draws the picture, too: whole, and in bands of rows.
+same_picture() { # same_picture VOLUME ISOVALUE
+  local volume=$source/tests/data/$1
+  quietly "$program" render "$volume" -i "$2" --size 96x54 --ambient 2 -o "$work/native.png" \
+    --save-scene "$work/scene.json"
+  quietly node --no-experimental-fetch "$source/tests/page_engine.cjs" \
+    "$build/library/tools/page/engine.js" "$source/tools/page/worker.js" "$volume" \
+    "$work/scene.json" "$work/engine.png"
+  cmp "$work/engine.png" "$work/native.png" || fail "$1: the engine's picture is another"
+}
+same_picture fuel_64x33x32_uint8.raw.gz 10
+
 same_bits fuel_64x33x32_uint8.raw.gz 10
 same_bits head_41x41x41_uint8.raw.gz 90
 

@@ -59,7 +59,9 @@ FrameArrays HostRenderer::fetch(const WantedArrays &wanted, const Appearance &ap
   if (wanted.picture) {
     const std::size_t channels = num_channels(&params);
     arrays.picture = memory_.array<std::uint8_t>(channels * size_.num_pixels());
+    const std::uint32_t end = std::min(rows_[1], size_.height);
     parallel_for(size_.height, num_threads_, [&](std::uint64_t row, std::uint32_t) {
+      if (row < rows_[0] || row >= end) return;
       std::uint8_t *const pixels = arrays.picture.data() + channels * size_.width * row;
       if (colors_.empty()) {
         host_loops().shade(frame_, shading, size_.samples, static_cast<uint>(row), hits_.data(),

@@ -126,6 +126,11 @@ FrameStats HostRenderer::render(const FrameRequest &request) {
   const auto begin = std::chrono::steady_clock::now();
   check(request, abilities());
   const ImageSize size = size_of(request, abilities());
+  if (rows_[0] >= std::min(rows_[1], size.height))
+    throw Error("rows {} to {} of a picture of {}: there are none", rows_[0], rows_[1],
+                size.height);
+  if (light_rays_of(request).bounces && rows_[1] - rows_[0] < size.height)
+    throw Error("light bounces in whole pictures alone, not in rows {} to {}", rows_[0], rows_[1]);
   const std::vector<FrameParams> frames = make_level_frames(levels_.infos(), request.camera, size,
                                                             request.isovalue, request.voxel_pixels);
   FrameStats stats;
@@ -445,13 +450,14 @@ bool HostRenderer::for_bands(const FrameRequest &request, Loop loop, Draw draw, 
                all = std::reduce(work.begin(), work.end());
   const std::thread::id own_thread = std::this_thread::get_id();
   std::atomic<std::uint64_t> num_tiles = 0;
-  const std::uint32_t width = frame_.view.width, rows = frame_.view.height,
+  const std::uint32_t begin_row = rows_of_rays()[0], rows = rows_of_rays()[1];
+  const std::uint32_t width = frame_.view.width,
                       tile_rows = std::max(kTileRays / size_.samples, 1u) * size_.samples;
   const std::uint32_t columns = rounded_up(width, kTileRays);
   const std::uint32_t band =
       on_pass ? tile_rows * rounded_up(kTilesPerThread * thread_count(num_threads_), columns)
-              : rows;
-  for (std::uint32_t row = 0; row < rows; row += band) {
+              : rows - begin_row;
+  for (std::uint32_t row = begin_row; row < rows; row += band) {
     const std::uint32_t end_row = std::min(rows - row, band) + row;
     levels_.room().run(
         std::uint64_t{columns} * rounded_up(end_row - row, tile_rows),
@@ -460,7 +466,8 @@ bool HostRenderer::for_bands(const FrameRequest &request, Loop loop, Draw draw, 
                      y = static_cast<std::uint32_t>(row + tile / columns * tile_rows);
           draw(RayTile{x, y, std::min(x + kTileRays, width), std::min(y + tile_rows, end_row)},
                is_alone);
-          const double share = double(++num_tiles) / (columns * rounded_up(rows, tile_rows));
+          const double share =
+              double(++num_tiles) / (columns * rounded_up(rows - begin_row, tile_rows));
           if (request.on_progress && std::this_thread::get_id() == own_thread)
             request.on_progress(100 * (before + std::min(share, 1.0) * work.at(own)) / all);
         });
@@ -468,6 +475,10 @@ bool HostRenderer::for_bands(const FrameRequest &request, Loop loop, Draw draw, 
     if (on_pass && !on_pass(pass) && (end_row < rows || more_follows)) return false;
   }
   return true;
+}
+
+std::array<std::uint32_t, 2> HostRenderer::rows_of_rays() const {
+  return {rows_[0] * size_.samples, std::min(rows_[1], size_.height) * size_.samples};
 }
 
 /// The hits' values of the field, in the same bands.

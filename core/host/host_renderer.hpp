@@ -6,6 +6,7 @@
 // cannot hold the isovalue, and cells whose corners are on one side. Rays decode the blocks that
 // they come to, which stay decoded for further frames.
 
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <optional>
@@ -51,6 +52,10 @@ class HostRenderer : public Renderer {
   /// Throws  Error: also a file that cannot be read; there are no hits() then. Several surfaces for
   ///         which the memory limit is too small
   FrameStats render(const FrameRequest &request) override;
+  /// From now on, frames draw the rows of pixels from `begin` to `end` alone, and so do pictures;
+  /// what arrays have for other rows says nothing. So several renderers draw a picture together.
+  /// Light does not bounce then, since that takes neighbours; a field's range is that of the rows.
+  void set_rows(std::uint32_t begin, std::uint32_t end) { rows_ = {begin, end}; }
   std::vector<HitRecord> cast_rays(std::span<const WorldRay> rays, float isovalue,
                                    Normals normals) override;
   Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {},
@@ -114,6 +119,8 @@ class HostRenderer : public Renderer {
   void blend_bounced(const FrameParams &frame, const LayerBlend &by, const LayerHits &layers);
   template <class Draw, class After>
   bool for_bands(const FrameRequest &request, Loop loop, Draw draw, After after);
+  /// The rows of rays that set_rows() leaves.
+  std::array<std::uint32_t, 2> rows_of_rays() const;
 
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();  ///< of making
   const CompressedVolume &volume_;
@@ -125,6 +132,7 @@ class HostRenderer : public Renderer {
   double setup_ms_;
   FrameParams frame_{};  ///< of the finest level, for shading
   ImageSize size_;
+  std::array<std::uint32_t, 2> rows_{0, ~0u};  ///< that are drawn: from, to
   std::vector<HitRecord> hits_;
   OpenCounts open_;
   std::vector<RayColor> colors_;          ///< of a frame of several or translucent surfaces

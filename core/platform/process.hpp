@@ -14,6 +14,9 @@ std::uint64_t process_id();
 /// The user's home by the system's list of users, whatever the environment says.
 std::optional<std::filesystem::path> home_by_list();
 
+/// The file of the program that this process runs; empty if the system does not say.
+std::filesystem::path own_program();
+
 void set_environment(const char *name, const char *value);
 void unset_environment(const char *name);
 

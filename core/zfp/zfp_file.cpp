@@ -60,6 +60,16 @@ void ZfpFileWriter::write(std::span<const std::byte> payload, std::size_t level)
 }
 
 void ZfpFileWriter::commit(const CompressedVolume &volume) {
+  finish(volume);
+  parts_.front().file.commit();
+}
+
+void ZfpFileWriter::read_back(const CompressedVolume &volume, const PayloadSink &take) {
+  finish(volume);
+  parts_.front().file.read_back(take);
+}
+
+void ZfpFileWriter::finish(const CompressedVolume &volume) {
   Part &all = parts_.front();
   ZfpLayout layout = all.write_parts(volume);
   for (std::size_t level = 1; level < parts_.size(); ++level) {
@@ -72,7 +82,6 @@ void ZfpFileWriter::commit(const CompressedVolume &volume) {
   }
   all.write_trailer(zfp_trailer_text(volume, layout),
                     zfp_version(volume, !layout.level_bytes.empty()));
-  all.file.commit();
 }
 
 void ZfpFileWriter::Part::write(std::span<const std::byte> bytes) {
@@ -147,12 +156,14 @@ ZfpLayout ZfpFileWriter::Part::write_parts(const CompressedVolume &volume) {
   return layout;
 }
 
-void write_zfp_file(const CompressedVolume &volume, const fs::path &path) {
+namespace {
+
+/// Writes all payload of a volume.
+void write_payload(const CompressedVolume &volume, const fs::path &path, ZfpFileWriter &file) {
   if (volume.bits_per_block % 64 != 0) {
     throw Error("{}: blocks of {} bits are no whole number of bits a voxel: copy the file instead",
                 path.string(), volume.bits_per_block);
   }
-  ZfpFileWriter file(path, volume);
   std::vector<std::uint32_t> words;
   for (std::size_t i = 0; i <= volume.coarser_levels.size(); ++i) {
     const CompressedVolume &level = i == 0 ? volume : volume.coarser_levels[i - 1];
@@ -163,7 +174,20 @@ void write_zfp_file(const CompressedVolume &volume, const fs::path &path) {
       file.write(std::as_bytes(std::span(words)), i);
     }
   }
+}
+
+}  // namespace
+
+void write_zfp_file(const CompressedVolume &volume, const fs::path &path) {
+  ZfpFileWriter file(path, volume);
+  write_payload(volume, path, file);
   file.commit(volume);
+}
+
+void give_zfp_file(const CompressedVolume &volume, const fs::path &path, const PayloadSink &take) {
+  ZfpFileWriter file(path, volume);
+  write_payload(volume, path, file);
+  file.read_back(volume, take);
 }
 
 }  // namespace isowave::core

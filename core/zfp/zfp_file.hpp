@@ -53,8 +53,11 @@ class ZfpFileWriter {
   void write(std::span<const std::byte> payload, std::size_t level = 0);
   /// Pads, writes indices and trailers from all fields but words, and renames the file into place.
   void commit(const CompressedVolume &volume);
+  /// Instead of commit(): hands over the file's bytes. Nothing is left behind.
+  void read_back(const CompressedVolume &volume, const PayloadSink &take);
 
  private:
+  void finish(const CompressedVolume &volume);
   /// A level's file.
   struct Part {
     explicit Part(const std::filesystem::path &path) : file(path) {}
@@ -72,5 +75,12 @@ class ZfpFileWriter {
 
   std::deque<Part> parts_;  ///< the coarser ones only until they are joined to the first
 };
+
+/// Hands over the bytes of the file that write_zfp_file() writes, piece by piece.
+///
+/// path    names a temporary file that is made and removed
+/// Throws  Error: as write_zfp_file()
+void give_zfp_file(const CompressedVolume &volume, const std::filesystem::path &path,
+                   const PayloadSink &take);
 
 }  // namespace isowave::core

@@ -25,6 +25,11 @@ install(FILES ${PROJECT_BINARY_DIR}/isowaveConfig.cmake
         DESTINATION ${package_folder} COMPONENT library)
 if(ISOWAVE_BUILD_PROGRAM)
   install(TARGETS isowave COMPONENT program)
+  # The engine of `isowave export`, if tools/wasm has made it here or in its own folder.
+  foreach(wasm ${PROJECT_BINARY_DIR}/wasm ${PROJECT_SOURCE_DIR}/build/wasm)
+    install(FILES ${wasm}/install/share/isowave/page.html.gz
+            DESTINATION ${CMAKE_INSTALL_DATADIR}/isowave COMPONENT program OPTIONAL)
+  endforeach()
   # The program writes its manual page and completion scripts.
   set(shell_files ${PROJECT_BINARY_DIR}/isowave.1)
   set(commands COMMAND isowave man > ${PROJECT_BINARY_DIR}/isowave.1)

@@ -13,6 +13,7 @@ void add_generate(CLI::App &app);
 void add_convert(CLI::App &app);
 void add_render(CLI::App &app);
 void add_extract(CLI::App &app);
+void add_export(CLI::App &app);
 void add_compare(CLI::App &app);
 void add_verify(CLI::App &app);
 void add_bench(CLI::App &app);

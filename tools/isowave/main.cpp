@@ -33,6 +33,7 @@ int run(int argc, char **argv) {
   add_convert(app);
   add_render(app);
   add_extract(app);
+  add_export(app);
   add_compare(app);
 #ifdef ISOWAVE_HAS_ORACLES
   add_verify(app);

@@ -16,6 +16,10 @@ std::optional<std::filesystem::path> home_by_list() {
   return {};
 }
 
+std::filesystem::path own_program() {
+  return {};
+}
+
 void set_environment(const char *name, const char *value) {
   ::setenv(name, value, 1);
 }

@@ -16,6 +16,7 @@ from isowave._color_map import ColorMap, color_map_for_core, color_map_of
 from isowave._handed_on import takes
 from isowave._image import Image
 from isowave._levels import Voxels
+from isowave._page import save_page
 from isowave._request import (
     FrameArguments,
     Look,
@@ -171,6 +172,29 @@ class Scene:
     ) -> Camera:
         """A view that the surfaces fill; arguments as Volume.camera()."""
         return self.volume.camera(surfaces=self.surfaces, size=size, device=device)
+
+    def save_html(self, path: str | os.PathLike[str], *, title: str = "") -> None:
+        """Writes a page: one HTML file that shows the scene in any browser, without a server.
+
+        The page holds the compressed volume and all that draws it, with the same bits. People can
+        turn the scene and change it. Without JavaScript, it shows a picture.
+
+        Parameters
+        ----------
+        path
+            The file's name, which ends in .html.
+        title
+            The page's title.
+
+        Raises
+        ------
+        Error
+            No surface; what a page does not show: annotations, a field, tables of colours,
+            surfaces with clipped or mapped False, more than eight clipping planes; a volume of
+            more than 350 MiB; a package without the engine for browsers; a file that cannot be
+            written.
+        """
+        save_page(self.volume, scene_fields(self), path, title)
 
     def __repr__(self) -> str:
         shown = [each.text for each in self.surfaces]

@@ -21,6 +21,7 @@ from isowave._handed_on import takes
 from isowave._image import Image
 from isowave._levels import Voxels
 from isowave._mesh import Mesh
+from isowave._page import save_page
 from isowave._progress import Progress, shown
 from isowave._renderer import (
     CAPABILITIES,
@@ -150,6 +151,16 @@ class Volume(Voxels):
     def scene(self) -> Scene:
         """An empty scene of this volume: scene().surface(80, "bone").render()."""
         return Scene(self)
+
+    def save_html(
+        self, path: str | os.PathLike[str], isovalue: Isovalue = "auto", *, title: str = ""
+    ) -> None:
+        """Writes a page that shows an isosurface in any browser: see Scene.save_html()."""
+        self.scene().surface(isovalue).save_html(path, title=title)
+
+    def save_page(self, fields: dict[str, Any], path: str | os.PathLike[str], title: str) -> None:
+        """The same of a scene's fields; for the viewer."""
+        save_page(self, fields, path, title)
 
     @takes(Renderer.render, size=DEFAULT_SIZE)
     def render(

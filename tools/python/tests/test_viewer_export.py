@@ -228,3 +228,27 @@ def test_scenes_are_dropped_and_recent_ones_come_again(page: Any) -> None:
     page.keyboard.press("Escape")
     assert not menu(page, "file").locator(".recent").is_visible()
     assert page.problems == []
+
+
+@pytest.mark.skipif(FIREFOX, reason="Playwright does not tell of Firefox's downloads")
+def test_a_page_is_saved_or_an_error_told(open_page: Callable[..., Any]) -> None:
+    volume = FakeVolume()
+    with Server(fake_scene(volume)) as server:
+        page = open_page()
+        page.goto(server.url)
+        rests(page)
+        menu(page, "export")
+        with page.expect_download() as saved:
+            button(page, "Save page").click()
+        assert saved.value.suggested_filename == "ball_80.html"
+        text = Path(saved.value.path()).read_text()
+        assert text == "<!doctype html><title>ball.nrrd</title>[80.0]"
+
+        def fail(*_: Any) -> None:
+            raise ValueError("pages need the engine")
+
+        volume.save_page = fail  # type: ignore[method-assign]
+        menu(page, "export")
+        button(page, "Save page").click()
+        page.get_by_text("pages need the engine").wait_for()
+        assert button(page, "Save page").is_enabled() and not page.problems

@@ -20,6 +20,7 @@ from isowave.viewer.protocol import (
     Ack,
     Budget,
     Hello,
+    PageFile,
     Probe,
     ProtocolError,
     SceneFile,
@@ -104,6 +105,7 @@ def test_messages_are_read() -> None:
         expected = Request(80, color_map=ColorMap("magma", (0, 0, 1), (-1, 5.5), by))
         assert shown.request.color_map == expected.color_map
     assert check({"type": "scene", "text": "{}"}) == SceneFile("{}")
+    assert check({"type": "page", "text": "{}"}) == PageFile("{}")
     sliced = check({**WISH, **PLAIN, "slices": [SLICE], "slice_map": SLICE_MAP, "step": 3})
     assert isinstance(sliced, Wish) and sliced.step == 3
     expected = Request(80, slice_map=ColorMap("magma", range=(5.5, -1)))

@@ -34,7 +34,7 @@ from isowave import ClipPlane, _scene_file
 from isowave._color_map import color_map_of
 from isowave.viewer import command, view
 from isowave.viewer import server as server_module
-from isowave.viewer.protocol import SceneFile
+from isowave.viewer.protocol import PageFile, SceneFile
 from isowave.viewer.scene import Scene
 from isowave.viewer.server import Server
 
@@ -507,3 +507,16 @@ def test_the_command_takes_a_field(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert served("--scene", str(file), "--field", "wind.zfp")["field_name"] == "wind.zfp"
     file.write_text(json.dumps({**scene, "color_by_field": False}))
     assert served("--scene", str(file))["field"] is None, "its colours do not need it"
+
+
+def test_pages_are_written_by_the_server() -> None:
+    scene = make_scene(FakeVolume(), Clock())
+    heard: list[tuple[dict[str, Any], bytes | None]] = []
+    client = scene.join(lambda head, data: heard.append((head, data)))
+    assert client is not None
+    scene.receive(client, PageFile(json.dumps(SCENE)))
+    head, data = heard[-1]
+    assert head == {"type": "page"} and data is not None and b"<title>" in data
+    scene.receive(client, PageFile('{"a\\nb'))
+    head, data = heard[-1]
+    assert head["type"] == "error" and data is None and "\n" not in head["message"]

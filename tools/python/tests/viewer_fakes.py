@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -126,6 +127,10 @@ class FakeVolume:
     def isovalue_notice(self, isovalue: float) -> str:
         least, largest = self.value_range
         return "" if least < isovalue <= largest else f"isovalue {isovalue:g} is outside."
+
+    def save_page(self, fields: dict[str, Any], path: Any, title: str) -> None:
+        isovalues = [surface["isovalue"] for surface in fields["surfaces"]]
+        Path(path).write_text(f"<!doctype html><title>{title}</title>{isovalues}")
 
     def suggested_isovalues(self) -> list[float]:
         if self.fail_suggesting:

@@ -11,6 +11,8 @@ const EXPORT_POP = `
     <label>With a scale bar <input name="with_bar" type="checkbox"></label>
     <div class="buttons"><button type="button" name="shot">Save PNG</button>
       <button type="button" name="stop_export" hidden>Stop</button></div>
+    <div class="buttons"><button type="button" name="save_page"
+      title="One HTML file that shows this in any browser, without a server">Save page</button></div>
     <p class="export_progress" role="status"></p>
     <label for="command">The same picture, by a command</label>
     <textarea id="command" name="command" rows="4" readonly spellcheck="false"></textarea>
@@ -38,6 +40,7 @@ class Export {
     });
     for (const name of ["clear", "with_bar"]) on(view.field(name), "change", () => this.show());
     on(view.field("shot"), "click", () => this.start());
+    on(view.field("save_page"), "click", () => this.startPage());
     on(view.field("stop_export"), "click", () => this.end("Stopped."));
     on(view.field("copy_command"), "click", async () => {
       if (!await view.copyText(this.command, "copy_command")) view.field("command").select();
@@ -136,6 +139,27 @@ class Export {
     this.showStop();
   }
 
+  /** The server writes the page of this scene. */
+  startPage() {
+    const { view } = this;
+    if (!view.volume || !view.state.camera || this.connection) return;
+    const text = writeScene(view.state, view.backgroundShown(), view.volume);
+    const name = this.name.replace(/png$/, "html");
+    this.say("Writing the page …");
+    const hear = {
+      welcome: () => this.connection.send({ type: "page", text }),
+      page: (head, data) => {
+        saveAs(new Blob([data], { type: "text/html" }), name);
+        this.end(`${name} is saved.`);
+      },
+      error: ({ message }) => this.end(message),
+      closed: ({ message }) => this.end(message),
+    };
+    this.connection = view.home.beside((head, data) => hear[head.type]?.(head, data));
+    this.connection.send({ type: "hello", version: VERSION });
+    this.showStop();
+  }
+
   end(text) {
     this.connection?.close();
     this.connection = null;
@@ -145,7 +169,9 @@ class Export {
 
   showStop() {
     this.view.field("stop_export").hidden = !this.connection;
-    this.view.field("shot").disabled = this.connection !== null;
+    for (const name of ["shot", "save_page"]) {
+      this.view.field(name).disabled = this.connection !== null;
+    }
   }
 
   say(text) {

@@ -75,18 +75,6 @@ const SILENT = "The kernel does not answer. If it is busy, pictures follow. If i
   + "run the cell again.";
 const RESTARTED = "The kernel was restarted: run the cell again.";
 
-/** Shows a picture until the first one comes. */
-async function showStill(view, data) {
-  const bitmap = await createImageBitmap(new Blob([data]));
-  const { picture, shown } = view;
-  picture.style.objectFit = "contain";
-  if (shown.wish < 0) {
-    Object.assign(picture, { width: bitmap.width, height: bitmap.height });
-    picture.getContext("2d").drawImage(bitmap, 0, 0);
-  }
-  bitmap.close();
-}
-
 const makeName = () => crypto.getRandomValues(new Uint32Array(4)).join("-"); // of a view
 
 /** Another view of the widget. receive: hears of messages. */
@@ -135,7 +123,7 @@ function render({ model, el }) {
   model.on("msg:custom", receive);
   model.on("change:height", resize);
   model.on("comm_live_update", restarted);
-  if (model.get("still")?.byteLength) showStill(view, model.get("still"));
+  if (model.get("still")?.byteLength) view.showStill(model.get("still"));
   view.connected();
   return () => {
     send(null);

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
@@ -144,6 +145,9 @@ class VolumeLike(Protocol):
         ...
 
     def renderer(self, **options: Unpack[RendererArguments]) -> RendererLike:
+        ...
+
+    def save_page(self, fields: dict[str, Any], path: str | os.PathLike[str], title: str) -> None:
         ...
 
 

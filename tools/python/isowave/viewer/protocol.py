@@ -26,6 +26,7 @@ looks nowhere.
     {"type": "probe", "id": 5, "at": [0.5, 0.25]}
     {"type": "budget", "bytes": 600000000 | null}
     {"type": "scene", "text": "a scene file's"}
+    {"type": "page", "text": "a scene file's"}
 
 max_error is in pixels of the surface, by proof or by sample; or, by picture, FLIP of the picture,
 and then samples are the most rays of a pixel that may be chosen.
@@ -40,7 +41,7 @@ alpha. A probe asks what is seen at a place of the last picture, from 0 at its l
 to 1.
 
 Answers are dicts with a "type": welcome, status, histogram, picture (with bytes), progress, bounds,
-probe, scene, error; view.js describes them.
+probe, scene, page (with bytes), error; view.js describes them.
 """
 
 from __future__ import annotations
@@ -134,6 +135,13 @@ class SceneFile:
 
 
 @dataclass(frozen=True)
+class PageFile:
+    """A scene that the front end saves as a page: it gets the bytes, or an error."""
+
+    text: str
+
+
+@dataclass(frozen=True)
 class Probe:
     """A question what is seen at a place of the last picture. at: x, y, 0 to 1."""
 
@@ -141,7 +149,7 @@ class Probe:
     at: tuple[float, float]
 
 
-Message = Hello | Wish | Ack | Budget | SceneFile | Probe
+Message = Hello | Wish | Ack | Budget | SceneFile | PageFile | Probe
 
 
 class TokenBucket:
@@ -536,6 +544,10 @@ def _read_scene(content: dict[str, Any]) -> SceneFile:
     return SceneFile(content["text"])
 
 
+def _read_page(content: dict[str, Any]) -> PageFile:
+    return PageFile(_read_scene(content).text)
+
+
 _READERS: Final[dict[str, tuple[dict[str, None], Callable[[dict[str, Any]], Message]]]] = {
     "hello": (dict.fromkeys(("type", "version")), _read_hello),
     "wish": (
@@ -549,5 +561,6 @@ _READERS: Final[dict[str, tuple[dict[str, None], Callable[[dict[str, Any]], Mess
     "ack": (dict.fromkeys(("type", "frame")), _read_ack),
     "budget": (dict.fromkeys(("type", "bytes")), _read_budget),
     "scene": (dict.fromkeys(("type", "text")), _read_scene),
+    "page": (dict.fromkeys(("type", "text")), _read_page),
     "probe": (dict.fromkeys(("type", "id", "at")), _read_probe),
 }

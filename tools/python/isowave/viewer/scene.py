@@ -35,10 +35,11 @@ from . import messages
 from .interfaces import ImageLike, ProgressLike, RendererLike, SeriesLike, VolumeLike
 from .hits import Hits, seen
 from .jpeg import encode_jpeg
+from .page_files import page_maker
 from .pictures import Extent, Stopped, annotate, chosen_voxel_pixels, encode_png
 from .pictures import laid_over, opaque, picture_of, share_within
 from .protocol import MAX_FLOAT32, MAX_RAYS, Ack, Budget, Message, Probe, ProtocolError
-from .protocol import SceneFile, Wish
+from .protocol import PageFile, SceneFile, Wish
 from .renderers import MakeHost, RendererOptions, Renderers, make_host
 from .steps import Steps
 from .turns import Client, Frame, Post, Stage, Turns, after_first
@@ -194,6 +195,9 @@ class Scene:
                 client.post(messages.error(RuntimeError(TOO_MANY_BUDGETS), None), None)
             elif isinstance(message, SceneFile):
                 client.post(messages.scene(message.text), None)
+            elif isinstance(message, PageFile):
+                make = page_maker(self._steps, self._title, message.text)
+                self._do(lambda: client.post(*make()))
             elif isinstance(message, Probe) and client.asks(message):
                 self._do(lambda: self._answer(client))
             self._changed.notify_all()

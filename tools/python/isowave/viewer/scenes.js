@@ -200,6 +200,7 @@ class SceneFiles {
   async open(file) {
     if (!file) return;
     if (!/\.json$/i.test(file.name)) {
+      if (this.view.home.open) return this.view.home.open(file);
       this.view.note(`${file.name} is no scene (.json). Volumes are opened by the command: `
         + "isowave view FILE.", "error");
       return;

@@ -1,8 +1,8 @@
 // view.js -- a view: pictures come from a scene (scene.py), wishes go to it. A part of
 // an ES module (front_end.py).
 //
-// What the front end says (protocol.py checks it): hello, wish, ack, budget, probe, scene. What it
-// hears:
+// What the front end says (protocol.py checks it): hello, wish, ack, budget, probe, scene, page.
+// What it hears:
 //
 //   welcome    title, shape [z,y,x], spacing, box [[x,y,z], [x,y,z]] in world space,
 //              anatomical: whether that is a patient's, LPS; dtype, range [low, high],
@@ -27,6 +27,7 @@
 //   progress   wish, percent: how far its picture is
 //   probe      id, position in world space, value there, field: the second volume's; null: nothing
 //   scene      fields of the scene file that was sent, as _core.parse_scene() gives them
+//   page       the bytes of an HTML file that shows the scene that was sent, with its volume
 //   bounds     wish, within_pixel: the share of the surface that is certainly so near to that of
 //              the volume before compression; null: there is no surface. errors_are_stated: that
 //              is certain only if the errors are right that the volume's file states
@@ -41,8 +42,8 @@
  * @typedef {{send: (message: Message) => void, close: () => void}} Connection
  * @typedef {{send: (message: Message) => void, wheel: (view: View) => boolean, hash: boolean,
  *    isDark: () => boolean, beside: (receive: (head: Message, data?: BlobPart) => void) =>
- *    Connection}} Home where a view is. wheel: whether the wheel is the view's; beside: another
- *    connection to the scene
+ *    Connection, open?: (file: File) => void}} Home where a view is. wheel: whether the wheel is
+ *    the view's; beside: another connection to the scene; open: opens a volume that was dropped
  */
 
 const VERSION = 12;
@@ -54,6 +55,10 @@ const WORK_MS = 700; // until the page says how far a picture is
 const DARK = "(prefers-color-scheme: dark)";
 
 const isFresher = (a, b) => a.wish > b.wish || (a.wish === b.wish && a.frame > b.frame);
+/** A picture's bytes. rgba: not encoded, as the engine in a page gives them. */
+const toBitmap = ({ format, size }, data) => createImageBitmap(format === "rgba"
+  ? new ImageData(data, ...size) : new Blob([data], { type: `image/${format}` }));
+
 /** One view: its elements, its state, and what it has shown. */
 class View {
   /**
@@ -195,7 +200,7 @@ class View {
     if (isFresher(head, this.arrived)) {
       this.arrived = head;
       try {
-        const bitmap = await createImageBitmap(new Blob([data], { type: `image/${head.format}` }));
+        const bitmap = await toBitmap(head, data);
         if (isFresher(head, this.shown)) this.draw(head, bitmap, data);
         bitmap.close();
       } catch {
@@ -203,6 +208,18 @@ class View {
       }
     }
     if (connection === this.connection) this.home.send({ type: "ack", frame: head.frame });
+  }
+
+  /** Shows a picture, by its bytes, until the first one comes. */
+  async showStill(data) {
+    const bitmap = await createImageBitmap(new Blob([data]));
+    const { picture, shown } = this;
+    picture.style.objectFit = "contain";
+    if (shown.wish < 0) {
+      Object.assign(picture, { width: bitmap.width, height: bitmap.height });
+      picture.getContext("2d").drawImage(bitmap, 0, 0);
+    }
+    bitmap.close();
   }
 
   draw(head, bitmap, data) {

@@ -1,0 +1,219 @@
+#include "isowave/page.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "core/api/guarded.hpp"
+#include "core/api/volume_implementation.hpp"
+#include "core/base/error.hpp"
+#include "core/io/atomic_file.hpp"
+#include "core/io/byte_source.hpp"
+#include "core/io/file_name.hpp"
+#include "core/platform/process.hpp"
+#include "core/zfp/zfp_file.hpp"
+#include "isowave/host_renderer.hpp"
+
+namespace isowave {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Browsers have texts of up to 2^29 characters.
+constexpr std::uint64_t kMostMebibytes = 350;
+constexpr std::uint64_t kMostEngineBytes = 1u << 25;
+constexpr std::size_t kMostPlanes = 8;  ///< as the viewer has it
+constexpr const char *kEngineName = "page.html.gz";
+/// Places of the engine, seen from the program's folder: installed, built, in Python's package.
+constexpr std::array kEngineFolders = {"../share/isowave", "wasm/install/share/isowave",
+                                       "../wasm/install/share/isowave", ".."};
+
+/// Writes bytes as base64 text.
+class Base64Text {
+ public:
+  explicit Base64Text(core::AtomicFile &file) : file_(file) {}
+
+  void write(std::span<const std::byte> bytes) {
+    std::string text;
+    for (const std::byte byte : bytes) {
+      group_ = group_ << 8 | std::to_integer<std::uint32_t>(byte);
+      if (++count_ == 3) add_group(text);
+    }
+    file_.write(text);
+  }
+  void finish() {
+    const std::uint32_t missing = count_ == 0 ? 0 : 3 - count_;
+    std::string text;
+    for (; count_ != 0 && count_ < 3; ++count_) group_ <<= 8;
+    if (count_ == 3) add_group(text);
+    for (std::uint32_t i = 0; i < missing; ++i) text[text.size() - 1 - i] = '=';
+    file_.write(text);
+  }
+
+ private:
+  void add_group(std::string &text) {
+    constexpr std::string_view kLetters =
+        "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    for (int shift = 18; shift >= 0; shift -= 6) text += kLetters[group_ >> shift & 63];
+    group_ = count_ = 0;
+  }
+
+  core::AtomicFile &file_;
+  std::uint32_t group_ = 0, count_ = 0;
+};
+
+fs::path find_engine(const fs::path &wanted) {
+  if (!wanted.empty()) return wanted;
+  if (const char *const named = std::getenv("ISOWAVE_PAGE"); named != nullptr && *named != '\0')
+    return named;
+  const fs::path program = core::platform::own_program().parent_path();
+  for (const char *folder : kEngineFolders) {
+    const fs::path file = program / folder / kEngineName;
+    std::error_code failure;
+    if (!program.empty() && fs::is_regular_file(file, failure)) return file.lexically_normal();
+  }
+  throw core::Error(
+      "pages need isowave's engine for browsers, which was not built: run tools/wasm, and give "
+      "its share/isowave/{} by --engine or ISOWAVE_PAGE",
+      kEngineName);
+}
+
+std::string read_engine(const fs::path &path) {
+  core::InflateSource source({std::make_shared<core::InputFile>(path), 0}, core::Packing::kGzip);
+  std::vector<std::byte> bytes(kMostEngineBytes);
+  const std::size_t count = source.read(bytes);
+  if (count == bytes.size()) throw core::Error("{}: no engine of a page", path.string());
+  return {reinterpret_cast<const char *>(bytes.data()), count};
+}
+
+/// Throws  core::Error: what the viewer's page does not show
+void check_for_page(const Scene &scene) {
+  const auto refuse = [](bool has, const char *what) {
+    if (has) throw core::Error("a page does not show {}: leave that out of the scene", what);
+  };
+  const Appearance &look = scene.appearance;
+  const auto any = [&](auto is) { return std::ranges::any_of(scene.surfaces, is); };
+  refuse(scene.annotations.has_value(), "annotations");
+  refuse(scene.camera && scene.camera->parallel_height, "a parallel view (parallel_height)");
+  refuse(!scene.field.empty() && scene.field != "volume", "a second volume (field)");
+  refuse(look.color_by_field && scene.field.empty(), "colours by a second volume");
+  refuse(look.transparent, "a transparent background");
+  refuse(!look.color_table.empty() || !look.slice_table.empty(), "tables of colours");
+  refuse(any([](const Surface &each) { return !each.clipped; }), "surfaces with clipped: false");
+  refuse(any([](const Surface &each) { return !each.mapped; }), "surfaces with mapped: false");
+  refuse(scene.clip.size() > kMostPlanes, "more than eight clipping planes");
+}
+
+std::vector<std::uint8_t> draw_poster(const std::shared_ptr<const Volume> &volume,
+                                      const Scene &scene, ImageSize size) {
+  Renderer renderer = make_host_renderer(
+      volume, {.field = scene.field.empty() ? nullptr : volume, .largest = size});
+  FrameRequest request = scene_request(scene);
+  request.size = size;
+  if (!scene.camera) request.camera = renderer.camera(scene.surfaces, size);
+  return encode_png(renderer.render(request));
+}
+
+/// For the text of an element or an attribute.
+std::string to_html(const std::string &text) {
+  std::string result;
+  for (const char letter : text) {
+    if (letter == '&' || letter == '<' || letter == '>' || letter == '"') {
+      result += fmt::format("&#{};", static_cast<int>(letter));
+    } else {
+      result += letter;
+    }
+  }
+  return result;
+}
+
+/// JSON that no browser takes for the end of its element.
+std::string to_json_of_page(const std::string &json) {
+  std::string result;
+  for (const char letter : json) {
+    if (letter == '<') {
+      result += "\\u003c";
+    } else {
+      result += letter;
+    }
+  }
+  return result;
+}
+
+constexpr std::array<std::string_view, 4> kPlaces = {"@ISOWAVE_TITLE@", "@ISOWAVE_POSTER@",
+                                                     "@ISOWAVE_SCENE@", "@ISOWAVE_VOLUME@"};
+/// The engine's text before, between and behind kPlaces.
+using EngineParts = std::array<std::string, kPlaces.size() + 1>;
+
+EngineParts read_parts(const fs::path &wanted) {
+  const fs::path path = find_engine(wanted);
+  const std::string engine = read_engine(path);
+  EngineParts parts;
+  std::size_t begin = 0;
+  for (std::size_t i = 0; i < kPlaces.size(); ++i) {
+    const std::size_t at = engine.find(kPlaces[i], begin);
+    if (at == engine.npos) throw core::Error("{}: no engine of a page", path.string());
+    parts[i] = engine.substr(begin, at - begin);
+    begin = at + kPlaces[i].size();
+  }
+  parts.back() = engine.substr(begin);
+  return parts;
+}
+
+void write_page(const Volume &volume, const Scene &scene, const fs::path &path,
+                const PageOptions &options, std::span<const std::uint8_t> poster) {
+  const EngineParts parts = read_parts(options.engine);
+  std::string title = options.title.empty() ? scene.volume.filename().string() : options.title;
+  if (title.empty()) title = "Volume";
+  Scene shown = scene;
+  shown.volume.clear();
+
+  core::AtomicFile file(path);
+  file.write(parts[0] + to_html(title) + parts[1]);
+  Base64Text picture(file);
+  picture.write(std::as_bytes(poster));
+  picture.finish();
+  file.write(parts[2] + to_json_of_page(scene_text(shown)) + parts[3]);
+  Base64Text bytes(file);
+  core::give_zfp_file(volume.implementation().volume, path,
+                      [&](std::span<const std::byte> piece) { bytes.write(piece); });
+  bytes.finish();
+  file.write(parts[4]);
+  file.commit();
+}
+
+}  // namespace
+
+void check_page(const Scene &scene, const fs::path &path, const PageOptions &options) {
+  core::guarded("writing a page", [&] {
+    core::check_ending(path, "pages are written as HTML", {".html", ".htm"});
+    if (path.extension().empty())
+      throw core::Error("{}: end the page's name in .html", path.string());
+    check_for_page(scene);
+    read_parts(options.engine);
+  });
+}
+
+void save_page(const std::shared_ptr<const Volume> &volume, const Scene &scene,
+               const fs::path &path, const PageOptions &options) {
+  core::guarded("writing a page", [&] {
+    if (!volume) throw core::Error("a page needs a volume");
+    check_page(scene, path, options);
+    if (const std::uint64_t mebibytes = volume->compressed_bytes() >> 20;
+        mebibytes > kMostMebibytes)
+      throw core::Error(
+          "the volume has {} MiB, and a page holds {}: compress it with a larger tolerance, or at "
+          "a lower rate",
+          mebibytes, kMostMebibytes);
+    const std::vector<std::uint8_t> poster = draw_poster(volume, scene, options.poster);
+    write_page(*volume, scene, path, options, poster);
+  });
+}
+
+}  // namespace isowave

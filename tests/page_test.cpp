@@ -1,0 +1,255 @@
+// Pages: what save_page() and `isowave export` write into an engine's page, and refuse. The engine
+// here is a text with the places alone; wasm_test.sh and test_pages.py have the real one. And rows
+// of pictures, which a page's workers draw.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <zlib.h>
+
+#include <array>
+#include <cstdlib>
+#include <isowave/isowave.hpp>
+#include <isowave/page.hpp>
+#include <string>
+#include <vector>
+
+#include "core/host/host_renderer.hpp"
+#include "core/io/png.hpp"
+#include "tests/api_support.hpp"
+#include "tests/frame_scene.hpp"
+#include "tests/run_program.hpp"
+
+namespace isowave {
+namespace {
+
+using core::test::error_of;
+using core::test::expect_one_line_error;
+using core::test::public_volume;
+using core::test::quoted;
+using core::test::read_file;
+using core::test::run_isowave;
+using core::test::TemporaryFolder;
+using core::test::write_file;
+using testing::HasSubstr;
+
+constexpr const char *kFuelFile = ISOWAVE_TEST_DATA "/fuel_64x33x32_uint8.raw.gz";
+constexpr const char *kPlaces =
+    "<title>@ISOWAVE_TITLE@</title>[@ISOWAVE_POSTER@]<@ISOWAVE_SCENE@>(@ISOWAVE_VOLUME@)end";
+
+std::filesystem::path write_engine(const TemporaryFolder &folder, const std::string &text) {
+  const std::filesystem::path path = folder / "engine.html.gz";
+  gzFile file = gzopen(path.c_str(), "wb");
+  gzwrite(file, text.data(), static_cast<unsigned>(text.size()));
+  gzclose(file);
+  return path;
+}
+
+/// The text between two others.
+std::string between(const std::string &text, const std::string &begin, const std::string &end) {
+  const std::size_t from = text.find(begin) + begin.size();
+  return text.substr(from, text.find(end, from) - from);
+}
+
+/// Bytes of base64.
+std::string decoded(const std::string &text) {
+  const std::string letters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string result;
+  unsigned bits = 0, count = 0;
+  for (const char letter : text.substr(0, text.find('='))) {
+    bits = bits << 6 | static_cast<unsigned>(letters.find(letter));
+    count += 6;
+    if (count < 8) continue;
+    count -= 8;
+    result += static_cast<char>(bits >> count & 255);
+  }
+  return result;
+}
+
+TEST(Page, HoldsTheVolumeTheSceneAndItsPicture) {
+  const TemporaryFolder folder;
+  const auto volume = public_volume();
+  const Scene scene{.surfaces = {{.isovalue = 10, .opacity = 0.5f}, {.isovalue = 90}}};
+  const PageOptions options{
+      .engine = write_engine(folder, kPlaces), .title = "a <b> & c", .poster = {64, 48}};
+  save_page(volume, scene, folder / "page.html", options);
+  const std::string page = read_file(folder / "page.html");
+  EXPECT_EQ(between(page, "<title>", "</title>"), "a &#60;b&#62; &#38; c");
+  EXPECT_EQ(page.substr(page.size() - 4), ")end");
+
+  volume->save(folder / "volume.zfp");
+  EXPECT_EQ(decoded(between(page, "(", ")")), read_file(folder / "volume.zfp"));
+  EXPECT_EQ(between(page, "]<", ">("), scene_text(scene));
+
+  Renderer renderer = make_host_renderer(volume);
+  FrameRequest request = scene_request(scene);
+  request.size = {64, 48};
+  request.camera = renderer.camera(scene.surfaces, request.size);
+  const std::vector<std::uint8_t> png = encode_png(renderer.render(request));
+  EXPECT_EQ(decoded(between(page, "[", "]")), std::string(png.begin(), png.end()));
+  EXPECT_EQ(folder.num_files(), 3u) << "a temporary file is left";
+}
+
+TEST(Page, TextsOfAnyLengthAreWhole) {
+  const TemporaryFolder folder;
+  const std::filesystem::path engine = write_engine(folder, kPlaces);
+  for (const std::uint32_t side : {4u, 5u, 6u, 7u}) {
+    const auto volume = compress(std::vector<float>(std::size_t{side} * side * side, 1.0f),
+                                 Grid{.dims = {side, side, side}});
+    save_page(volume, {.surfaces = {{.isovalue = 2}}}, folder / "p.html",
+              {.engine = engine, .poster = {side, 3}});
+    volume->save(folder / "v.zfp");
+    EXPECT_EQ(decoded(between(read_file(folder / "p.html"), "(", ")")),
+              read_file(folder / "v.zfp"));
+  }
+}
+
+TEST(Page, NoTextEndsItsElement) {
+  const TemporaryFolder folder;
+  Scene scene{.surfaces = {{.isovalue = 10}}};
+  scene.field = "volume";
+  scene.volume = "</script>.zfp";
+  save_page(public_volume(), scene, folder / "p.html",
+            {.engine = write_engine(folder, kPlaces), .poster = {8, 8}});
+  EXPECT_EQ(read_file(folder / "p.html").find("</script"), std::string::npos);
+}
+
+TEST(Page, RefusesWhatAPageDoesNotShow) {
+  const TemporaryFolder folder;
+  const PageOptions options{.engine = write_engine(folder, kPlaces), .poster = {8, 8}};
+  const auto refused = [&](const auto &change) {
+    Scene scene{.surfaces = {{.isovalue = 10}}};
+    change(scene);
+    return error_of([&] { save_page(public_volume(), scene, folder / "p.html", options); });
+  };
+  EXPECT_THAT(refused([](Scene &s) { s.annotations.emplace(); }), HasSubstr("annotations"));
+  EXPECT_THAT(refused([](Scene &s) { s.field = "heat.zfp"; }), HasSubstr("a second volume"));
+  EXPECT_THAT(refused([](Scene &s) { s.appearance.color_by_field = true; }),
+              HasSubstr("colours by a second volume"));
+  EXPECT_THAT(refused([](Scene &s) { s.camera.emplace().parallel_height = 3; }),
+              HasSubstr("parallel"));
+  EXPECT_THAT(refused([](Scene &s) { s.appearance.transparent = true; }), HasSubstr("transparent"));
+  EXPECT_THAT(refused([](Scene &s) { s.appearance.color_table.resize(256); }),
+              HasSubstr("tables of colours"));
+  EXPECT_THAT(refused([](Scene &s) { s.surfaces[0].clipped = false; }), HasSubstr("clipped"));
+  EXPECT_THAT(refused([](Scene &s) { s.surfaces[0].mapped = false; }), HasSubstr("mapped"));
+  EXPECT_THAT(refused([](Scene &s) { s.clip.resize(9); }), HasSubstr("clipping planes"));
+  EXPECT_THAT(refused([](Scene &s) { s.surfaces.clear(); }), HasSubstr("surfaces"));
+  EXPECT_EQ(folder.num_files(), 1u) << "the engine alone";
+}
+
+TEST(Page, RefusesWhatIsNoEngine) {
+  const TemporaryFolder folder;
+  const auto error = [&](const std::filesystem::path &engine) {
+    return error_of([&] {
+      save_page(public_volume(), {.surfaces = {{.isovalue = 10}}}, folder / "p.html",
+                {.engine = engine, .poster = {8, 8}});
+    });
+  };
+  EXPECT_THAT(error(folder / "none.gz"), HasSubstr("none.gz"));
+  EXPECT_THAT(error(write_engine(folder, "<html>")), HasSubstr("no engine of a page"));
+  write_file(folder / "page.html.gz", "<html>");
+  EXPECT_THAT(error(folder / "page.html.gz"), HasSubstr("page.html.gz"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "p.html"));
+}
+
+class CliExport : public testing::Test {
+ protected:
+  std::string in(const std::string &name) const { return quoted(folder_ / name); }
+  std::string engine() const { return " --engine " + quoted(write_engine(folder_, kPlaces)); }
+  /// The scene of a page.
+  Scene scene_in(const std::string &name) const {
+    return parse_scene(between(read_file(folder_ / name), "]<", ">("));
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(CliExport, OneIsovalueOrAScene) {
+  const std::string fuel = std::string("export ") + kFuelFile + engine();
+  const auto one = run_isowave(fuel + " -i 10 -o " + in("a.html"));
+  ASSERT_EQ(one.status, 0) << one.err;
+  EXPECT_THAT(one.out, HasSubstr("wrote "));
+  EXPECT_THAT(read_file(folder_ / "a.html"), HasSubstr("<title>fuel_64x33x32_uint8.raw.gz<"));
+  EXPECT_EQ(scene_in("a.html").surfaces.at(0).isovalue, 10);
+
+  write_file(folder_ / "s.json", R"({"isowave_scene": 1, "volume": ")" + std::string(kFuelFile) +
+                                     R"(", "surfaces": [{"isovalue": 20, "opacity": 0.5}]})");
+  for (const std::string &what : std::vector<std::string>{"export " + in("s.json") + engine(),
+                                                          fuel + " --scene " + in("s.json")}) {
+    const auto of_scene = run_isowave(what + " --title Fuel -o " + in("b.html"));
+    ASSERT_EQ(of_scene.status, 0) << of_scene.err;
+    EXPECT_EQ(scene_in("b.html").surfaces.at(0).opacity, 0.5f);
+    EXPECT_THAT(read_file(folder_ / "b.html"), HasSubstr("<title>Fuel<"));
+  }
+  // A volume that is compressed already is taken as it is.
+  ASSERT_EQ(run_isowave(std::string("convert ") + kFuelFile + " -o " + in("v.zfp")).status, 0);
+  ASSERT_EQ(run_isowave("export " + in("v.zfp") + engine() + " -o " + in("c.html")).status, 0);
+  EXPECT_EQ(decoded(between(read_file(folder_ / "c.html"), "(", ")")),
+            read_file(folder_ / "v.zfp"));
+}
+
+TEST_F(CliExport, WrongInputIsOneLine) {
+  const std::string fuel = std::string("export ") + kFuelFile;
+  write_file(folder_ / "s.json", R"({"isowave_scene": 1, "surfaces": [{"isovalue": 20}]})");
+  expect_one_line_error("export " + in("s.json") + engine(), "names no volume");
+  expect_one_line_error(fuel + engine() + " -i 10 -o " + in("a.png"), "HTML");
+  expect_one_line_error(fuel + engine() + " -i 3 --scene " + in("s.json") + " -o " + in("a.html"),
+                        "--isovalue");
+  expect_one_line_error(fuel + " -i 10 --engine " + in("none") + " -o " + in("a.html"), "none");
+  expect_one_line_error("export " + in("no.zfp") + engine() + " -o " + in("a.html"), "no.zfp");
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "a.html"));
+}
+
+}  // namespace
+
+namespace core {
+namespace {
+
+/// Renderers that share a picture's rows out draw it together.
+TEST(HostRows, TogetherAreThePicture) {
+  const test::TestVolume volume({21, 18, 23}, test::gyroid_field(9), 8);
+  const Camera camera = orbit_cameras(volume.info(), 3)[1];
+  const SurfaceStyle front{.isovalue = 0.6f, .opacity = 0.4f}, behind{.isovalue = 0.0f};
+  FrameRequest plain{.camera = camera, .isovalue = 0.1f, .size = ImageSize{23, 17, 2}};
+  plain.ambient_rays = 3;
+  FrameRequest layered = plain;
+  layered.surfaces = {front, behind};
+  for (const FrameRequest &request : {plain, layered}) {
+    HostRenderer whole(volume.compressed);
+    whole.render(request);
+    const std::vector<std::uint8_t> expected = whole.shade().pixels;
+    std::vector<std::uint8_t> together(expected.size());
+    std::uint64_t hits = 0;
+    for (const std::array<std::uint32_t, 2> rows : {std::array{0u, 1u}, {1u, 9u}, {9u, 17u}}) {
+      HostRenderer part(volume.compressed);
+      part.set_rows(rows[0], rows[1]);
+      hits += part.render(request).rays_hit;
+      const std::vector<std::uint8_t> pixels = part.shade().pixels;
+      const std::size_t row = std::size_t{3} * 23;
+      std::copy(pixels.begin() + std::ptrdiff_t(row * rows[0]),
+                pixels.begin() + std::ptrdiff_t(row * rows[1]),
+                together.begin() + std::ptrdiff_t(row * rows[0]));
+    }
+    EXPECT_EQ(together, expected);
+    EXPECT_GT(hits, 100u);
+    EXPECT_EQ(hits, whole.render(request).rays_hit);
+  }
+}
+
+TEST(HostRows, RefusesRowsThatAreNotThere) {
+  const test::TestVolume volume({5, 5, 5}, test::gyroid_field(9), 8);
+  HostRenderer renderer(volume.compressed);
+  FrameRequest request{.camera = orbit_cameras(volume.info(), 3)[1], .size = ImageSize{23, 17}};
+  renderer.set_rows(17, 20);
+  EXPECT_THAT(test::error_of([&] { renderer.render(request); }), HasSubstr("there are none"));
+  renderer.set_rows(0, 9);
+  request.light.towards_light = glm::dvec3(0, 0, 1);
+  request.bounce_rays = 2;
+  EXPECT_THAT(test::error_of([&] { renderer.render(request); }), HasSubstr("whole pictures"));
+  renderer.set_rows(0, 17);
+  renderer.render(request);
+}
+
+}  // namespace
+}  // namespace core
+}  // namespace isowave

@@ -1,0 +1,48 @@
+#!/usr/bin/env python3
+"""make_page.py ENGINE.js ENGINE.wasm VIEWER OUT.html.gz: the page without a volume.
+
+The page has the viewer's front end (folder VIEWER), the engine, and places for what isowave's
+save_page() puts in: @ISOWAVE_TITLE@, @ISOWAVE_POSTER@, @ISOWAVE_SCENE@, @ISOWAVE_VOLUME@.
+"""
+
+import base64
+import gzip
+import hashlib
+import runpy
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+HOMES = "homes.js"  # of servers and notebooks; local.js comes in its place
+
+
+def script(viewer: Path) -> str:
+    parts = runpy.run_path(str(viewer / "front_end.py"))["PARTS"]
+    files = [viewer / part for part in parts if part != HOMES] + [HERE / "local.js"]
+    return "\n" + "\n".join(file.read_text(encoding="utf-8") for file in files)
+
+
+def main() -> None:
+    glue, module, viewer, out = map(Path, sys.argv[1:])
+    code = glue.read_text(encoding="utf-8") + "\n" + (HERE / "worker.js").read_text()
+    view = script(viewer)
+    for text in (code, view):
+        if "</script" in text.lower():
+            sys.exit("make_page: a script holds the end of its element")
+    packed = gzip.compress(module.read_bytes(), 9, mtime=0)
+    values = {
+        "LICENCES": (HERE / "notices.txt").read_text().strip(),
+        "HASH": base64.b64encode(hashlib.sha256(view.encode()).digest()).decode(),
+        "CODE": code,
+        "MODULE": base64.b64encode(packed).decode(),
+        "SCRIPT": view,
+    }
+    page = (HERE / "page.html").read_text(encoding="utf-8")
+    for name, value in values.items():
+        page = page.replace(f"@{name}@", value, 1)
+    out.write_bytes(gzip.compress(page.encode(), 9, mtime=0))
+    print(f"engine: {len(packed)} bytes, packed; page: {len(page)} bytes")
+
+
+if __name__ == "__main__":
+    main()
