@@ -145,6 +145,10 @@ TEST(Annotations, TheColorBarHasTheColorsAndTicksOfItsRange) {
   request.appearance.color_axis = {1, 1, 0};
   EXPECT_EQ(only({.color_bar = true}, request, std::array{0.0, 1.0}).texts.back().text,
             "along (1, 1, 0)");
+  request.appearance.color_by_depth = true;
+  EXPECT_EQ(
+      only({.color_bar = true, .units = "um"}, request, std::array{0.0, 1.0}).texts.back().text,
+      "depth [um]");
   request.appearance.color_by_field = true;
   EXPECT_EQ(only({.color_bar = true, .units = "um"}, request, std::array{2.0, 2.0}).texts.size(),
             2u);

@@ -47,10 +47,23 @@ TEST_F(CliColorBy, AxesAndMapsMakeDifferentPictures) {
   EXPECT_EQ(draw("--color-by z,0,40"), draw("--color-by z"));  // the volume's box
 }
 
+TEST_F(CliColorBy, DepthIsAlongTheView) {
+  const std::string front = draw("--view front --color-by depth");
+  EXPECT_EQ(draw("--view front --color-by 0,0,-1"), front);
+  EXPECT_EQ(draw("--view right --color-by depth"), draw("--view right --color-by 1,0,0"));
+  EXPECT_NE(draw("--view front --color-by depth,-30,0"), front);
+  expect_one_line_error("render " + kHead + "--color-by depth,5 --device host",
+                        "--color-by depth,5");
+  expect_one_line_error(
+      "render " + kHead + "--color-by depth --device host --max-image-error 0.1 --orbit 2",
+      "colours by depth differ from view to view");
+}
+
 TEST_F(CliColorBy, AllRenderersDrawTheSameBytes) {
   for (const std::string &more : {std::string(), std::string(" --samples 2 --clip 1,0,0.2"),
                                   std::string(" --transparent --parallel")}) {
-    const std::string options = "--color-by 1,0,2" + more, host = draw(options);
+    const std::string by = more.empty() ? "depth" : "1,0,2";
+    const std::string options = "--color-by " + by + more, host = draw(options);
     EXPECT_EQ(draw(options, "--device cpu"), host) << more;
     EXPECT_EQ(draw(options, "--reference"), host) << more;
   }

@@ -110,7 +110,7 @@ TEST_F(CliLabels, ColoursByWhatIsNoLabelAreRefused) {
     EXPECT_THAT(result.err, HasSubstr(why));
   };
   refuse_whole("--color-by labels", "the field's voxels are no labels");
-  refuse_whole("--color-by missing.raw,labels", "give x, y, z, NX,NY,NZ, volume or a file");
+  refuse_whole("--color-by missing.raw,labels", "give x, y, z, NX,NY,NZ, depth, volume or a file");
   refuse("--labels 3 --color-by labels --annotate color-bar", "colours of labels have no order");
 }
 

@@ -42,7 +42,8 @@ TEST_F(CliScene, EveryPictureIsDrawnAgainFromItsScene) {
         "-i 40 --slice z,20 --slice 1,1,0 --slice-opacity 0.5 --slice-map magma --clip x",
         "--surface 10,skin,,whole --slice y --slice-range 0,99 --clip 0,0,1",
         "-i 40 --light 1,2,0.5 --shadow 2 --light-angle 9 --bounce 3",
-        "-i 40 --color-by 1,1,0,5,60 --color-map magma --samples 2"}) {
+        "-i 40 --color-by 1,1,0,5,60 --color-map magma --samples 2",
+        "-i 40 --color-by depth --view left"}) {
     render(kFuel + options + " -o " + in("a.png") + " --save-scene " + in("s.json"));
     const std::string samples = options.find("--samples") == options.npos ? "" : " --samples 2";
     render("--scene " + in("s.json") + " -o " + in("b.png") + samples);
@@ -93,6 +94,57 @@ TEST_F(CliScene, OptionsNameAnotherVolumeAndOtherCameras) {
   render(kFuel + std::string("-i 40 -o ") + in("c.png") + " --save-scene " + in("s.json"));
   render("--scene " + in("s.json") + " --orbit 2 -o " + in("b.png"));
   EXPECT_EQ(picture("b_view1.png"), picture("a_view1.png"));
+}
+
+TEST_F(CliScene, DepthFollowsTheView) {
+  render(kFuel + std::string("-i 40 --color-by depth --view left -o ") + in("a.png") +
+         " --save-scene " + in("s.json"));
+  render(kFuel + std::string("-i 40 --color-by depth --view top -o ") + in("a.png"));
+  render("--scene " + in("s.json") + " --view top -o " + in("b.png"));
+  EXPECT_EQ(picture("b.png"), picture("a.png"));
+}
+
+TEST_F(CliScene, KeepsTheIndexOfItsFiles) {
+  std::string voxels = "NRRD0004\ntype: uint8\nencoding: raw\ndimension: 4\nsizes: 8 8 8 3\n\n";
+  for (int step = 0; step < 3; ++step)
+    for (int i = 0; i < 512; ++i)
+      voxels += static_cast<char>(i % 8 * 20 + (i / 8 % 8) * step * 5 + i / 64);
+  test::write_file(folder_ / "four.nrrd", voxels);
+  const auto drawn = [&](const std::string &options) {
+    render(options + " -o " + in("a.png"));
+    return picture("a.png");
+  };
+  const std::string four = in("four.nrrd"), scene = "--scene " + in("s.json");
+  const std::string by = " --color-by '" + (folder_ / "four.nrrd").string() + "'";
+  const std::string first =
+      drawn(four + " -i 70 --index t=1" + by + " --field-index t=2 --save-scene " + in("s.json"));
+  EXPECT_THAT(picture("s.json"), HasSubstr("\"index\": \"t=1\""));
+  EXPECT_THAT(picture("s.json"), HasSubstr("\"field_index\": \"t=2\""));
+  EXPECT_EQ(drawn(scene + " --save-scene " + in("t.json")), first);
+  EXPECT_EQ(picture("t.json"), picture("s.json"));
+  // Options choose others. The index is of the scene's file, not of another one.
+  const std::string camera = " --cameras " + in("c.json");
+  drawn(four + " -i 70 --index t=1 --save-camera " + in("c.json"));
+  EXPECT_EQ(drawn(scene + " --index t=0"),
+            drawn(four + " -i 70 --index t=0" + by + " --field-index t=2" + camera));
+  EXPECT_EQ(drawn(scene + " --field-index t=0"),
+            drawn(four + " -i 70 --index t=1" + by + " --field-index t=0" + camera));
+  EXPECT_NE(drawn(scene + " --field-index t=0"), first);
+  EXPECT_NE(drawn(scene + " --index t=0"), first);
+  const std::string alone =
+      R"({"isowave_scene": 1, "surfaces": [{"isovalue": 40}], "volume": "a.nrrd", "index": "t=1")";
+  write_scene_text(alone + "}");
+  drawn(kFuel + scene);
+  write_scene_text(alone + R"(, "dataset": "ct"})");
+  drawn(kFuel + scene);
+  expect_one_line_error("render --device host " + scene,
+                        "s.json: dataset ct: isowave's Python package");
+  write_scene_text(R"({"isowave_scene": 1, "surfaces": [{"isovalue": 40}], "volume": "a.nrrd",)"
+                   R"( "index": "c=1"})");
+  expect_one_line_error("render --device host " + scene, "s.json: index c=1: give t=N");
+  expect_one_line_error(
+      "render --device host " + std::string(kFuel) + "-i 40 --color-by volume --field-index t=1",
+      "--field-index: no file's values");
 }
 
 TEST_F(CliScene, BadScenesAreOneLine) {

@@ -52,7 +52,7 @@ TYPED_TEST(LayerReaderOfType, CompressesAsAnArrayDoes) {
   const std::vector<TypeParam> voxels = ramp<TypeParam>();
   for (const Compression &compression :
        {Compression{.rate = 8}, Compression{.tolerance = 0.5},
-        Compression{.relative_tolerance = 0.01}, Compression{.rate = 8, .levels = 2}}) {
+        Compression{.tolerance_relative = 0.01}, Compression{.rate = 8, .levels = 2}}) {
     std::vector<int> counts;
     const auto of_layers =
         compress(counting_reader(voxels, counts), voxel_type_of<TypeParam>(), kGrid, compression);

@@ -26,8 +26,12 @@ using testing::Not;
 /// A scene in which every field has another value than by default.
 Scene full_scene() {
   Scene scene;
-  scene.volume = "head.nrrd";
-  scene.field = "heat.nrrd";
+  scene.volume = "head.h5";
+  scene.dataset = "scan/ct";
+  scene.index = "t=3,c=0";
+  scene.field = "heat.h5";
+  scene.field_dataset = "T";
+  scene.field_index = "t=1";
   scene.camera = Camera{{1, 2, 3}, {0, 0.1, 0}, {0, 0, 1}, 45, 2.5};
   scene.surfaces = {{500, {1, 128 / 255.0f, 0}, 0.3f}, {1150.25, {0.1f, 0.2f, 0.3f}, 1}};
   scene.surfaces[1].clipped = false;
@@ -47,6 +51,7 @@ Scene full_scene() {
   scene.appearance.light_angle = 1.5;
   scene.appearance.color_map = "magma";
   scene.appearance.color_axis = {1, 0, 0};
+  scene.appearance.color_by_depth = true;
   scene.appearance.color_caps_alone = true;
   scene.appearance.color_by_field = true;
   scene.appearance.color_by_label = true;
@@ -63,7 +68,8 @@ Scene full_scene() {
 std::string fields_of(const Scene &scene) {
   FrameRequest request = scene_request(scene);
   request.surfaces = scene.surfaces;
-  return scene.volume.string() + " " + scene.field.string() +
+  return scene.volume.string() + " " + scene.dataset + " " + scene.index + " " +
+         scene.field.string() + " " + scene.field_dataset + " " + scene.field_index +
          (scene.camera ? " seen " : " unseen ") + text_of(request);
 }
 
@@ -186,6 +192,13 @@ TEST(Scene, BadTextsAreOneLineThatSaysWhere) {
       {with(surface + R"(, "camera": {"eye": [0, 0, 0], "at": [0, 0, 0]})"), "camera"},
       {with(surface + R"(, "color_map": 5)"), "color_map must be a text"},
       {with(surface + R"(, "field": ["heat.nrrd"])"), "field must be a text"},
+      {with(surface + R"(, "index": 3, "volume": "a.nrrd")"), "index must be a text"},
+      {with(surface + R"(, "dataset": "ct")"), "dataset: the scene names no file of the volume"},
+      {with(surface + R"(, "index": "t=1")"), "index: the scene names no file of the volume"},
+      {with(surface + R"(, "field_dataset": "T")"),
+       "field_dataset: the scene names no file of the field"},
+      {with(surface + R"(, "field": "volume", "field_index": "t=1")"),
+       "field_index: the scene names no file of the field"},
       {with(surface + R"(, "color_by_field": true)"), "colours by a field need a colour map"},
       {with(surface + R"(, "color_map": "viridis", "color_low": 1)"), "color_low and color_high"},
       {with(surface + R"(, "background": null)"), "background"},
@@ -245,6 +258,19 @@ TEST(Scene, FilesFindTheirVolumeFromAnyFolder) {
   write_scene(scene, folder / "scenes" / "a.json");
   EXPECT_EQ(read_scene(folder / "scenes" / "a.json").volume,
             std::filesystem::current_path() / "head.nrrd");
+}
+
+TEST(Scene, TheIndexOfAFileChoosesItsStep) {
+  Scene scene = full_scene();
+  EXPECT_THAT(error_of([&] { scene_volume(scene); }),
+              AllOf(HasSubstr("dataset scan/ct: "), HasSubstr("isowave[files]")));
+  EXPECT_THAT(error_of([&] { scene_field(scene); }), HasSubstr("field_dataset T: "));
+  scene.dataset = scene.field_dataset = "";
+  EXPECT_EQ(scene_field(scene).step, 1u);
+  EXPECT_THAT(error_of([&] { scene_volume(scene); }), HasSubstr("index t=3,c=0: give t=N"));
+  scene.index = "t=3";
+  EXPECT_EQ(scene_volume(scene).step, 3u);
+  EXPECT_FALSE(scene_volume(one_surface()).step.has_value());
 }
 
 TEST(Scene, TheDrawnVolumeIsNoFileOfThatName) {

@@ -109,8 +109,8 @@ TEST_F(StatedErrors, HonestFilesAreAccepted) {
          {Storage{.rate = 1, .levels = 0, .measure_error = true},
           Storage{.rate = 6, .levels = 0, .measure_error = true},
           Storage{.rate = 32, .levels = 0, .measure_error = true}, Storage{.rate = 2, .levels = 0},
-          Storage{.relative_tolerance = 0.1, .levels = 0},
-          Storage{.relative_tolerance = 1e-5, .levels = 0}}) {
+          Storage{.tolerance_relative = 0.1, .levels = 0},
+          Storage{.tolerance_relative = 1e-5, .levels = 0}}) {
       const CompressedVolume volume = make_volume("generate:" + name, storage);
       EXPECT_FALSE(volume.errors_are_stated);
       write_zfp_file(volume, path_);

@@ -161,6 +161,7 @@ bool has_map(const Appearance &appearance) {
 
 std::string bar_title(const Appearance &appearance, const std::string &units) {
   if (appearance.color_by_field) return "value";
+  if (appearance.color_by_depth) return units.empty() ? "depth" : fmt::format("depth [{}]", units);
   const Vector3 &axis = appearance.color_axis;
   std::string text = fmt::format("along ({:.3g}, {:.3g}, {:.3g})", axis[0], axis[1], axis[2]);
   for (std::size_t i = 0; i < 3; ++i) {

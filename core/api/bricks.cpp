@@ -78,7 +78,7 @@ std::string text_of(const BrickOptions &options, const core::Storage &storage) {
       renderer.largest.height, renderer.largest.samples, renderer.with_levels, renderer.with_bounds,
       renderer.with_time_budget, renderer.with_rays, renderer.with_bounce, renderer.with_surfaces,
       renderer.with_labels, options.bricks, options.field.string(), storage.rate.value_or(0),
-      storage.tolerance.value_or(0), storage.relative_tolerance.value_or(0), storage.exact,
+      storage.tolerance.value_or(0), storage.tolerance_relative.value_or(0), storage.exact,
       storage.levels, storage.map_nan.value_or(0),
       storage.no_data ? fmt::to_string(*storage.no_data) : "none");
 }

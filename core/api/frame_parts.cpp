@@ -186,6 +186,18 @@ core::Appearance core_appearance(const Appearance &appearance, const core::Volum
   return result;
 }
 
+core::Appearance core_appearance(const FrameRequest &request, const core::VolumeInfo &whole) {
+  if (!request.appearance.color_by_depth) return core_appearance(request.appearance, whole);
+  if (request.max_image_error && request.series.size() > 1)
+    throw core::Error(
+        "colours by depth differ from view to view: draw one view within an error of the picture, "
+        "or colour along an axis");
+  Appearance along_view = request.appearance;
+  for (std::size_t i = 0; i < 3; ++i)
+    along_view.color_axis[i] = request.camera.at[i] - request.camera.eye[i];
+  return core_appearance(along_view, whole);
+}
+
 core::Slices core_slices(const std::vector<Slice> &slices, const Appearance &appearance,
                          const std::array<float, 2> &value_range) {
   core::Slices result;
@@ -220,7 +232,7 @@ core::FrameRequest core_request(const FrameRequest &request, const core::Compres
   // Several surfaces have their own isovalues.
   result.isovalue = result.surfaces.empty() ? core::drawn_isovalue(volume, request.isovalue)
                                             : result.surfaces.front().isovalue;
-  result.light = core_appearance(request.appearance, volume.info);
+  result.light = core_appearance(request, volume.info);
   result.size = core_size(request.size);
   result.clip = core_clip(request.clip, request.caps);
   result.voxel_pixels = request.voxel_pixels;

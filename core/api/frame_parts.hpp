@@ -45,6 +45,8 @@ core::ColorTable color_table_of(const std::string &map,
 /// whole   of the whole volume
 /// Throws  core::Error: a colour map that there is not, or that cannot be shown
 core::Appearance core_appearance(const Appearance &appearance, const core::VolumeInfo &whole);
+/// That of a request, whose camera says along which axis the depth is.
+core::Appearance core_appearance(const FrameRequest &request, const core::VolumeInfo &whole);
 /// The request as core has it, without on_pass.
 core::FrameRequest core_request(const FrameRequest &request, const core::CompressedVolume &volume);
 

@@ -85,7 +85,7 @@ Frame Renderer::Implementation::draw(const FrameRequest &request) {
   const auto begin = std::chrono::steady_clock::now();
   check_wanted(request, renderer_->abilities());
   core::FrameRequest wanted = core_request(request, volume_);
-  ProgressOf progress(*renderer_, core_appearance(request.appearance, whole()));
+  ProgressOf progress(*renderer_, core_appearance(request, whole()));
   if (request.on_pass) {
     wanted.on_pass = [&](const core::PassStats &pass) {
       return progress.show(pass, request.on_pass);
@@ -136,7 +136,7 @@ std::optional<std::array<double, 2>> range_of_colors(
 void Renderer::Implementation::fetch(const FrameRequest &request, Frame &frame) {
   const core::WantedArrays wanted{request.want_picture, request.want_depth, request.want_normals,
                                   request.want_positions, request.want_field};
-  const core::Appearance appearance = core_appearance(request.appearance, whole());
+  const core::Appearance appearance = core_appearance(request, whole());
   const auto range = renderer_->field_range();
   frame.statistics.color_range = range_of_colors(appearance, range);
   if (!request.slices.empty()) {

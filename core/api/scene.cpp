@@ -20,6 +20,7 @@
 #include "core/io/atomic_file.hpp"
 #include "core/io/file_name.hpp"
 #include "core/io/json_file.hpp"
+#include "core/io/raw_reader.hpp"
 #include "core/sources/load_volume.hpp"
 
 namespace isowave {
@@ -272,9 +273,25 @@ void check_annotations(const Scene &scene) {
                       kMostUnits);
 }
 
-/// Throws  core::Error: what surfaces, planes, camera and annotations cannot be
+/// Throws  core::Error: a part of a file that is not named
+void check_parts(const Scene &scene) {
+  const auto refuse = [](const char *name, const char *file, const std::string &part) {
+    if (!part.empty()) throw core::Error("{}: the scene names no file of the {}", name, file);
+  };
+  if (scene.volume.empty()) {
+    refuse("dataset", "volume", scene.dataset);
+    refuse("index", "volume", scene.index);
+  }
+  if (scene.field.empty() || scene.field == kDrawnVolume) {
+    refuse("field_dataset", "field", scene.field_dataset);
+    refuse("field_index", "field", scene.field_index);
+  }
+}
+
+/// Throws  core::Error: what files, surfaces, planes, camera and annotations cannot be
 void check(const Scene &scene) {
   if (scene.surfaces.empty()) throw core::Error("surfaces: give at least one");
+  check_parts(scene);
   std::vector<core::SurfaceStyle> styles;
   for (const Surface &surface : scene.surfaces) {
     styles.push_back(core_style(surface));
@@ -316,6 +333,17 @@ std::string text_of_scene(const Scene &scene) {
   ordered_json document = {{kVersionKey, kVersion}};
   document.update(value_of(scene));
   return text_of_json(document, "") + "\n";
+}
+
+/// prefix: of the names of Scene's fields
+RawFile part_of_file(const std::string &prefix, const std::string &dataset,
+                     const std::string &index) {
+  if (!dataset.empty())
+    throw core::Error(
+        "{}dataset {}: isowave's Python package reads files of several arrays: pip install "
+        "'isowave[files]'",
+        prefix, dataset);
+  return {.step = core::parse_index(prefix + "index", index)};
 }
 
 bool is_relative_file(const fs::path &volume) {
@@ -368,6 +396,17 @@ void write_scene(const Scene &scene, const fs::path &path) {
     core::AtomicFile file(path);
     file.write(text_of_scene(moved));
     file.commit();
+  });
+}
+
+RawFile scene_volume(const Scene &scene) {
+  return core::guarded("reading a scene",
+                       [&] { return part_of_file("", scene.dataset, scene.index); });
+}
+
+RawFile scene_field(const Scene &scene) {
+  return core::guarded("reading a scene", [&] {
+    return part_of_file("field_", scene.field_dataset, scene.field_index);
   });
 }
 

@@ -42,21 +42,21 @@ glm::uvec3 to_uvec3(const std::array<std::uint32_t, 3> &values) {
 }
 
 bool is_default(const Compression &compression) {
-  return !compression.rate && !compression.tolerance && !compression.relative_tolerance &&
+  return !compression.rate && !compression.tolerance && !compression.tolerance_relative &&
          !compression.exact && !compression.measure_error && compression.levels == 1 &&
          !compression.map_nan && !compression.no_data;
 }
 
 core::Storage to_storage(const Compression &compression) {
   const int num_ways = int{compression.rate.has_value()} + int{compression.tolerance.has_value()} +
-                       int{compression.relative_tolerance.has_value()} + int{compression.exact};
+                       int{compression.tolerance_relative.has_value()} + int{compression.exact};
   if (num_ways > 1)
     throw core::Error(
         "compression by more than one of rate, tolerance, relative tolerance, exact: give one");
   core::Storage storage;
   storage.rate = compression.rate;
   storage.tolerance = compression.tolerance;
-  storage.relative_tolerance = compression.relative_tolerance;
+  storage.tolerance_relative = compression.tolerance_relative;
   storage.exact = compression.exact;
   storage.measure_error = compression.measure_error;
   storage.levels = compression.levels;

@@ -362,6 +362,15 @@ void convert_to_double(VoxelType type, std::span<const std::byte> voxels, std::s
   convert_voxels(type, voxels, out);
 }
 
+std::optional<std::uint32_t> parse_index(std::string_view name, std::string_view text) {
+  if (text.empty()) return {};
+  constexpr std::string_view kAxis = "t=";
+  const auto step =
+      text.starts_with(kAxis) ? parse_all<std::uint32_t>(text.substr(kAxis.size())) : std::nullopt;
+  if (!step) throw Error("{} {}: give t=N, counted from 0, such as t=3", name, text);
+  return step;
+}
+
 std::optional<RawName> parse_raw_name(std::string_view stem) {
   const std::size_t type_at = stem.rfind('_');
   if (type_at == std::string_view::npos || type_at == 0) return std::nullopt;

@@ -35,6 +35,12 @@ struct RawName {
 /// the type is known; dims may be anything that fits 32 bits.
 std::optional<RawName> parse_raw_name(std::string_view stem);
 
+/// The step that "t=3" asks for; none if the text is empty.
+///
+/// name    of the text, in messages
+/// Throws  Error: it asks for something else
+std::optional<std::uint32_t> parse_index(std::string_view name, std::string_view text);
+
 /// Converts little-endian voxels of `type` to float32. voxels.size() == out.size() * size_of(type).
 void convert_to_float(VoxelType type, std::span<const std::byte> voxels, std::span<float> out);
 /// The same to float64. Throws Error on integers that float64 does not hold.

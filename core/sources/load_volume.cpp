@@ -71,11 +71,11 @@ double absolute_tolerance(const OpenReader &open, std::string_view what, const S
     throw Error("{}: all voxels are {}: there is no range that an error is relative to", what,
                 range[0]);
   }
-  const double tolerance = *storage.relative_tolerance * (range[1] - range[0]);
+  const double tolerance = *storage.tolerance_relative * (range[1] - range[0]);
   if (!(tolerance > 0 && std::isfinite(tolerance))) {
     throw Error(
         "a relative tolerance of {}: of values from {} to {}, that is {}: need above 0 and finite",
-        *storage.relative_tolerance, range[0], range[1], tolerance);
+        *storage.tolerance_relative, range[0], range[1], tolerance);
   }
   return tolerance;
 }
@@ -90,10 +90,10 @@ std::optional<BlockPrecision> find_precision(const OpenReader &open, std::string
       throw Error("a {} of {}: must be above 0", name, *tolerance);
   };
   check("tolerance", storage.tolerance);
-  check("relative tolerance", storage.relative_tolerance);
+  check("relative tolerance", storage.tolerance_relative);
   InputOptions input{storage.map_nan, storage.no_data, {}, storage.num_threads, storage.part};
   ErrorGoal goal{storage.tolerance, storage.exact};
-  if (storage.relative_tolerance) goal.tolerance = absolute_tolerance(open, what, storage, input);
+  if (storage.tolerance_relative) goal.tolerance = absolute_tolerance(open, what, storage, input);
   input.progress = step(storage, "measuring errors");
   return choose_precision(*open(), goal, input);
 }

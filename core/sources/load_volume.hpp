@@ -14,12 +14,12 @@
 
 namespace isowave::core {
 
-/// How voxels are compressed: by one of rate, tolerance, relative_tolerance and exact. By default
+/// How voxels are compressed: by one of rate, tolerance, tolerance_relative and exact. By default
 /// they keep all that float32 holds of them: find_precision().
 struct Storage {
   std::optional<std::uint32_t> rate{};         ///< bits per voxel
   std::optional<double> tolerance{};           ///< largest error of a voxel
-  std::optional<double> relative_tolerance{};  ///< the same, as a part of the range of values
+  std::optional<double> tolerance_relative{};  ///< the same, as a part of the range of values
   bool exact = false;                          ///< no error: refuses what float32 does not hold
   std::uint32_t levels = 1;                    ///< of detail; 0: all there can be
   bool measure_error = false;                  ///< at a fixed rate, too
@@ -34,7 +34,7 @@ struct Storage {
 
   /// Whether a volume of this type is read more than once.
   bool reads_again(VoxelType type) const {
-    return !rate && (tolerance || relative_tolerance || exact || type != VoxelType::kFloat32);
+    return !rate && (tolerance || tolerance_relative || exact || type != VoxelType::kFloat32);
   }
 };
 

@@ -301,10 +301,10 @@ std::vector<Point> measure_ways(ocl::Device &device, const ParetoSubject &subjec
   std::map<std::pair<std::optional<std::uint32_t>, std::optional<double>>,
            std::vector<const ParetoWay *>>
       by_storage;
-  for (const ParetoWay *way : ways) by_storage[{way->rate, way->relative_tolerance}].push_back(way);
+  for (const ParetoWay *way : ways) by_storage[{way->rate, way->tolerance_relative}].push_back(way);
   std::vector<Point> points;
   for (const auto &[storage, of_storage] : by_storage) {
-    CompressionOptions compression{.rate = storage.first, .relative_tolerance = storage.second};
+    CompressionOptions compression{.rate = storage.first, .tolerance_relative = storage.second};
     if (std::ranges::any_of(of_storage, &ParetoWay::needs_levels)) compression.levels = 0;
     compression.measure_error = std::ranges::any_of(of_storage, &ParetoWay::needs_bounds);
     const CompressedVolume volume =

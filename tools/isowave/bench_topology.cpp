@@ -106,7 +106,7 @@ void run_bench_topology(const BenchTopologyArgs &options) {
   }
   for (const double part : {0.002, 0.01, 0.05}) {
     const CompressedVolume volume =
-        load_volume(options.input, overrides, {.relative_tolerance = part});
+        load_volume(options.input, overrides, {.tolerance_relative = part});
     rows.push_back(compare_surfaces(fmt::format("--tolerance-relative {}", part), truth,
                                     Surface(volume, options.isovalue), finest.info, 1));
   }

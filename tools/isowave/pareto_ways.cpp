@@ -18,7 +18,7 @@ std::vector<ParetoWay> make_ways() {
     ways.push_back({.name = fmt::format("--rate {}", rate), .rate = rate});
   for (const double part : {0.002, 0.01}) {
     ways.push_back(
-        {.name = fmt::format("--tolerance-relative {}", part), .relative_tolerance = part});
+        {.name = fmt::format("--tolerance-relative {}", part), .tolerance_relative = part});
   }
   for (const std::uint32_t samples : {2u, 3u, 4u, 8u})
     ways.push_back({.name = fmt::format("--samples {}", samples), .samples = samples});

@@ -26,7 +26,7 @@ enum class DrawnBy {
 struct ParetoWay {
   std::string name;                            ///< its options of `render`, or what it is
   std::optional<std::uint32_t> rate{};         ///< --rate; or
-  std::optional<double> relative_tolerance{};  ///< --tolerance-relative; else lossless
+  std::optional<double> tolerance_relative{};  ///< --tolerance-relative; else lossless
   DrawnBy drawn_by = DrawnBy::kDevice;
   std::string pipeline = "rays", solver{to_string(kDefaultSolver)};
   std::uint32_t samples = 1;

@@ -135,7 +135,10 @@ void FrameOfMany::write_outputs(const isowave::FrameRequest &request, const Fram
     if (!options.scene.save.empty()) {
       isowave::Scene scene = isowave::scene_of(request);
       scene.volume = options.input;
+      scene.index = options.volume.index;
       scene.field = options.color_map.field;
+      scene.field_dataset = options.color_map.dataset;
+      scene.field_index = options.color_map.index;
       scene.annotations = options.annotations;
       isowave::write_scene(scene, options.scene.save);
     }
@@ -440,21 +443,42 @@ void read_scene_of_options(RenderArgs &options, Drawing &drawing) {
   read_light(options.light, drawing.appearance);
 }
 
+/// The scene's files, unless VOLUME names another, and where in them the voxels are, unless --index
+/// and --field-index say it.
+void take_files(const isowave::Scene &scene, RenderArgs &options) {
+  isowave::Scene files = scene;
+  if (!options.volume.index.empty()) files.index.clear();
+  if (!options.color_map.index.empty()) files.field_index.clear();
+  const bool has_field = options.color_map.by_field && scene.field != "volume";
+  try {
+    if (options.input.empty()) scene_volume(files);  // or throws
+    if (has_field) scene_field(files);
+  } catch (const isowave::Error &error) {
+    throw Error("{}: {}", options.scene.file, error.what());
+  }
+  if (options.input.empty()) {
+    options.input = scene.volume.string();
+    if (options.volume.index.empty()) options.volume.index = files.index;
+  }
+  options.color_map.field = scene.field.string();
+  options.color_map.dataset = scene.field_dataset;
+  if (options.color_map.index.empty()) options.color_map.index = files.field_index;
+}
+
 /// What is drawn, as --scene says it. Options may name another volume and other cameras.
 void read_scene_of_file(const CLI::App &command, RenderArgs &options, Drawing &drawing) {
   const isowave::Scene scene = read_scene_option(command, options.scene);
   const isowave::FrameRequest request = isowave::scene_request(scene);
-  if (options.input.empty()) options.input = scene.volume.string();
   options.frame.isovalues = {request.isovalue};
   options.surfaces = request.surfaces;
   options.slices = request.slices;
   options.clip = core_clip(request.clip, request.caps);
   drawing.appearance = request.appearance;
-  options.color_map.field = scene.field.string();
   options.color_map.by_field = drawing.appearance.color_by_field;
   if (options.color_map.by_field && scene.field.empty())
     throw Error("{}: its colours are by a field, and it names none: add \"field\", a file",
                 options.scene.file);
+  take_files(scene, options);
   options.transparent = request.appearance.transparent;
   options.light.shadow_rays = request.appearance.shadow_rays;
   options.light.bounce_rays = request.appearance.bounce_rays;

@@ -220,7 +220,7 @@ void check_options(const CLI::App &command, const RenderArgs &options, const Tea
   check_surface_options(command, options, team);
   check_slice_options(command, options);
   check_movie_options(command, options);
-  if (!options.color_map.by_field)
+  if (!options.color_map.by_field || options.color_map.field == "volume")
     refuse_options(command, {"--field-index"}, "no file's values colour the surface: leave it out");
   if (team.size() > 1) {
     refuse_options(command, {"--reference", "--verbose"},

@@ -123,13 +123,14 @@ void add_color_map_options(CLI::App &command, ColorMapOptions &options) {
   command
       .add_option("--color-by", options.by,
                   "colour surfaces by the distance from the world's origin along an axis: x, y, z "
-                  "or a direction; or by the values of a second volume at the hits: its file, or "
+                  "or a direction; or along the view: depth; or by the values of a second volume "
+                  "at the hits: its file, or "
                   "`volume` to show the voxels of the same one on caps. LOW,HIGH: distances or "
                   "values of the first and the "
                   "last colour [those of the volume's box, or of the field at the hits; with "
                   "--surface, of the whole field]. `labels`: with --labels, by each label; or by "
                   "those of another segmentation: FILE,labels")
-      ->type_name("x|y|z|NX,NY,NZ|FILE|volume[,LOW,HIGH]|labels|FILE,labels");
+      ->type_name("x|y|z|NX,NY,NZ|depth|FILE|volume[,LOW,HIGH]|labels|FILE,labels");
   command
       .add_option("--color-map", options.map, "colours of --color-by [viridis; by labels, labels]")
       ->check(CLI::IsMember(isowave::color_map_names()))
@@ -170,7 +171,7 @@ bool read_labelled_field(ColorMapOptions &options, isowave::Appearance &appearan
 /// name: ./z is that file.
 bool read_field(ColorMapOptions &options, isowave::Appearance &appearance) {
   const std::string first = options.by.substr(0, options.by.find(','));
-  if (first == "x" || first == "y" || first == "z") return false;
+  if (first == "x" || first == "y" || first == "z" || first == "depth") return false;
   std::string name = options.by;
   std::vector<double> range;
   while (range.size() < 2 && !std::filesystem::exists(name)) {
@@ -203,14 +204,17 @@ void read_color_map(ColorMapOptions &options, isowave::Appearance &appearance) {
     return;
   const auto refuse = [&] {
     return Error(
-        "--color-by {}: give x, y, z, NX,NY,NZ, volume or a file, and LOW,HIGH if "
+        "--color-by {}: give x, y, z, NX,NY,NZ, depth, volume or a file, and LOW,HIGH if "
         "wanted; or labels, or a file and labels",
         options.by);
   };
   std::vector<double> numbers;
   for (const std::string_view field : split_at_commas(options.by)) {
     const std::size_t axis = std::string_view("xyz").find(field);
-    if (numbers.empty() && field.size() == 1 && axis != std::string_view::npos) {
+    if (numbers.empty() && field == "depth") {
+      numbers = {0, 0, 1};
+      appearance.color_by_depth = true;
+    } else if (numbers.empty() && field.size() == 1 && axis != std::string_view::npos) {
       numbers.resize(3);
       numbers[axis] = 1;
     } else if (const std::optional<double> value = parse_finite(field)) {

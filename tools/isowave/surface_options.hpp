@@ -36,9 +36,10 @@ void read_light(const LightOptions &options, isowave::Appearance &appearance);
 /// --color-by and --color-map as typed; read_color_map() checks them. A scene file sets the fields
 /// that read_color_map() would.
 struct ColorMapOptions {
-  /// X, Y, Z, NX,NY,NZ, `volume` or a file, and [,LOW,HIGH]; or `labels`, or a file and `,labels`
+  /// X, Y, Z, NX,NY,NZ, depth, `volume` or a file, and [,LOW,HIGH]; or `labels`, or FILE,labels
   std::string by;
   std::string index{};    ///< t=N, of a field's file with a fourth axis
+  std::string dataset{};  ///< of a field's file, kept for scenes: no option
   std::string field{};    ///< set by read_color_map(): `volume`, a file, or none
   bool by_field = false;  ///< set by read_color_map(): colours are by it
   std::string map{};      ///< see core/view/color_maps.hpp; empty: viridis, or by labels, labels

@@ -46,16 +46,6 @@ void add_volume_options(CLI::App &command, VolumeOptions &options) {
       ->type_name("t=N");
 }
 
-std::optional<std::uint32_t> parse_index(const char *option, const std::string &text) {
-  if (text.empty()) return {};
-  constexpr std::string_view kAxis = "t=";
-  const auto step = text.starts_with(kAxis)
-                        ? parse_all<std::uint32_t>(std::string_view(text).substr(kAxis.size()))
-                        : std::nullopt;
-  if (!step) throw Error("{} {}: give t=N, counted from 0, such as t=3", option, text);
-  return step;
-}
-
 glm::uvec3 to_dims(const std::vector<std::uint32_t> &numbers) {
   if (numbers.size() == 1) return glm::uvec3(numbers[0]);
   if (numbers.size() == 3) return {numbers[0], numbers[1], numbers[2]};
@@ -93,7 +83,7 @@ void add_compression_options(CLI::App &command, CompressionOptions &options) {
   CLI::Option *tolerance = command.add_option(
       "--tolerance", options.tolerance,
       "compress to as few bits as possible, with each voxel within this error of the input's");
-  CLI::Option *relative = command.add_option("--tolerance-relative", options.relative_tolerance,
+  CLI::Option *relative = command.add_option("--tolerance-relative", options.tolerance_relative,
                                              "as --tolerance, but a part of the range of values");
   CLI::Option *exact = command.add_flag(
       "--exact", options.exact,
@@ -129,10 +119,10 @@ namespace {
 
 Storage to_storage(const CompressionOptions &options) {
   Storage storage;
-  if (!options.tolerance && !options.relative_tolerance && !options.exact)
+  if (!options.tolerance && !options.tolerance_relative && !options.exact)
     storage.rate = options.rate;
   storage.tolerance = options.tolerance;
-  storage.relative_tolerance = options.relative_tolerance;
+  storage.tolerance_relative = options.tolerance_relative;
   storage.exact = options.exact;
   storage.levels = options.levels;
   storage.measure_error = options.measure_error;

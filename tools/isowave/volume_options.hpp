@@ -34,15 +34,13 @@ struct VolumeOptions {
 void add_volume_options(CLI::App &command, VolumeOptions &options);
 /// Throws Error in one line on two numbers, unknown types, other axes.
 RawOverrides to_overrides(const VolumeOptions &options);
-/// The entry of an option's t=N; none if the text is empty. Throws Error.
-std::optional<std::uint32_t> parse_index(const char *option, const std::string &text);
 /// N or X Y Z. Throws Error on another count.
 glm::uvec3 to_dims(const std::vector<std::uint32_t> &numbers);
 
 /// How a volume is compressed: see Storage.
 struct CompressionOptions {
   std::optional<std::uint32_t> rate{};  ///< bits per voxel; any of the next three replaces it
-  std::optional<double> tolerance{}, relative_tolerance{};
+  std::optional<double> tolerance{}, tolerance_relative{};
   bool exact = false;
   std::uint32_t levels = 1;                    ///< of detail; 0: all there can be
   bool measure_error = false;                  ///< at a fixed rate, too

@@ -220,7 +220,7 @@ isowave::Compression compression_of(const nb::dict &options) {
   const auto get = reader_of(options);
   get("rate", result.rate);
   get("tolerance", result.tolerance);
-  get("relative_tolerance", result.relative_tolerance);
+  get("tolerance_relative", result.tolerance_relative);
   get("exact", result.exact);
   get("measure_error", result.measure_error);
   get("levels", result.levels);

@@ -75,6 +75,7 @@ struct Appearance {
   std::string color_map{};
   std::vector<std::array<float, 3>> color_table{};  ///< 256 colours instead of a map by name
   Vector3 color_axis{0, 0, 1};                      ///< world space, of any length above 0
+  bool color_by_depth = false;  ///< along the camera's view instead of color_axis
   /// Colours are by the value of the renderer's field at a hit instead (RendererOptions::field),
   /// trilinear between its voxels. Hits without a value, outside its grid or without data, have
   /// the surface's own colour. Not with time_budget_ms.
@@ -302,6 +303,7 @@ void for_each_appearance_field(AnyAppearance &appearance, const Visit &visit) {
   visit("color_map", appearance.color_map);
   visit("color_table", appearance.color_table);
   visit("color_axis", appearance.color_axis);
+  visit("color_by_depth", appearance.color_by_depth);
   visit("color_by_field", appearance.color_by_field);
   visit("color_caps_alone", appearance.color_caps_alone);
   visit("color_by_label", appearance.color_by_label);

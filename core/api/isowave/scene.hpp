@@ -20,6 +20,9 @@
 //
 //    "field": "temperature.nrrd", "color_map": "magma", "color_by_field": true
 //
+// "dataset": "scan/ct" chooses one of several arrays of the volume's file, "index": "t=3,c=0"
+// entries of its further axes; "field_dataset" and "field_index" do so in the field's file.
+//
 // The keys of annotations are the fields of Annotations: scale_bar, axes, color_bar, caption, units
 // and title. Each annotation is left out unless it is true. A caption without a title gets the name
 // of the volume's file.
@@ -32,15 +35,21 @@
 
 #include "isowave/annotations.hpp"
 #include "isowave/frame.hpp"
+#include "isowave/volume.hpp"
 
 namespace isowave {
 
 /// What is drawn. A frame needs a size and a camera beside it.
 struct Scene {
   std::filesystem::path volume{};  ///< file of the volume; empty: not said
+  std::string dataset{};           ///< name of the array in that file; empty: the only one
+  /// Entries of axes beside x, y and z in that file, from 0: "t=3,c=0"; empty: there are none.
+  std::string index{};
   /// File of the second volume, for Appearance::color_by_field; empty: not said. `volume`: the
   /// drawn volume itself (./volume is a file of that name).
   std::filesystem::path field{};
+  std::string field_dataset{};     ///< as dataset, of the field's file
+  std::string field_index{};       ///< as index, of the field's file
   std::optional<Camera> camera{};  ///< none: a view that the volume's box fills
   /// 1 to 8. One opaque surface is drawn as FrameRequest::isovalue, several as
   /// FrameRequest::surfaces.
@@ -60,7 +69,11 @@ struct Scene {
 template <class AnyScene, class Visit>
 void for_each_scene_field(AnyScene &scene, const Visit &visit) {
   visit("volume", scene.volume);
+  visit("dataset", scene.dataset);
+  visit("index", scene.index);
   visit("field", scene.field);
+  visit("field_dataset", scene.field_dataset);
+  visit("field_index", scene.field_index);
   visit("camera", scene.camera);
   visit("surfaces", scene.surfaces);
   visit("slices", scene.slices);
@@ -85,6 +98,12 @@ Scene read_scene(const std::filesystem::path &path);
 /// Writes a scene file. Relative paths of volume and field become relative to the file's folder. A
 /// file that exists is replaced when the new one is complete.
 void write_scene(const Scene &scene, const std::filesystem::path &path);
+
+/// What open_volume() needs beside Scene::volume, and beside Scene::field: the step of its index.
+///
+/// Throws  Error: a dataset, or another axis than t, which isowave's Python package reads
+RawFile scene_volume(const Scene &scene);
+RawFile scene_field(const Scene &scene);
 
 /// A request that draws the scene. It has no size, and without Scene::camera no camera.
 /// annotation_layout() says where the scene's annotations are.

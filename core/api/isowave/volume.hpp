@@ -51,13 +51,13 @@ struct Region {
   std::array<std::uint32_t, 3> step{1, 1, 1};
 };
 
-/// How voxels are compressed: by at most one of rate, tolerance, relative_tolerance and exact. By
+/// How voxels are compressed: by at most one of rate, tolerance, tolerance_relative and exact. By
 /// default, voxels are kept as float32 holds them: integers below 2^24 and float32 have no error.
 /// Compression takes memory for the result and a few layers of voxels.
 struct Compression {
   std::optional<std::uint32_t> rate{};         ///< bits per voxel, 1 to 32
   std::optional<double> tolerance{};           ///< no voxel is off by more [voxel values]
-  std::optional<double> relative_tolerance{};  ///< the same, as a part of the range of values
+  std::optional<double> tolerance_relative{};  ///< the same, as a part of the range of values
   bool exact = false;          ///< refuses voxels that float32 does not hold; else as by default
   bool measure_error = false;  ///< decodes all, for Volume::max_voxel_error() at a rate, too
   std::uint32_t levels = 1;    ///< levels of detail, with the volume itself; 0: all it can have

@@ -25,7 +25,7 @@ def step(time: float) -> np.ndarray:
 camera = None
 for i in range(num_steps):
     volume = isowave.compress(
-        step(i / max(num_steps - 1, 1)), relative_tolerance=1e-3, spacing=(4 / 63,) * 3
+        step(i / max(num_steps - 1, 1)), tolerance_relative=1e-3, spacing=(4 / 63,) * 3
     )
     if camera is None:
         camera = volume.camera(0.4, size=(320, 240))

@@ -116,7 +116,7 @@ class BrickRenderer(Placed[_core.Renderer]):
         what its brick needs of it. A file that is not compressed is compressed like the volume.
     bricks
         Number of bricks along x, y and z; None: bricks of equal size.
-    tolerance, relative_tolerance, rate, exact, map_nan, no_data
+    tolerance, tolerance_relative, rate, exact, map_nan, no_data
         As isowave.open()'s.
 
     Raises
@@ -145,7 +145,7 @@ class BrickRenderer(Placed[_core.Renderer]):
         field: str | os.PathLike[str] | None = None,
         bricks: tuple[int, int, int] | None = None,
         tolerance: float | None = None,
-        relative_tolerance: float | None = None,
+        tolerance_relative: float | None = None,
         rate: int | None = None,
         exact: bool = False,
         map_nan: float | None = None,
@@ -155,7 +155,7 @@ class BrickRenderer(Placed[_core.Renderer]):
 
         def read() -> tuple[dict[str, Any], dict[str, Any]]:
             compression = compression_options(
-                tolerance, relative_tolerance, rate, exact, 1, map_nan, no_data, 0
+                tolerance, tolerance_relative, rate, exact, 1, map_nan, no_data, 0
             )
             compression["measure_error"] = False
             can = {"levels": levels, "bounds": bounds, "rays": rays, "bounce": bounce}

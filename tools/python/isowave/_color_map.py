@@ -13,7 +13,8 @@ from isowave import _core
 from isowave._camera import vector
 from isowave._checked import numbers, refuse
 
-BY = ("axis", "field", "caps", "labels")
+BY = ("axis", "depth", "field", "caps", "labels")
+BY_FIELD = ("field", "caps", "labels")  # of a second volume
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
@@ -35,8 +36,9 @@ class ColorMap:
     #: By a field, values; None: the least and the largest at the hits, or with several or
     #: translucent surfaces, of the field.
     range: tuple[float, float] | None = None
-    #: "axis"; "field": hits without a value have the surface's own colour; "caps": caps show the
-    #: field, the volume itself unless there is another, and surfaces have their own colour;
+    #: "axis"; "depth": the axis along which the camera looks; "field": hits without a value have
+    #: the surface's own colour; "caps": caps show the field, the volume itself unless there is
+    #: another, and surfaces have their own colour;
     #: "labels": label L has colour L % 256. Voxels of the field, or without one of the volume
     #: itself, are labels, exact whole numbers from 0 to 65,535. A hit has the label of the nearest
     #: voxel with one other than 0, the background; on a surface of labels of the volume itself, of
@@ -108,7 +110,8 @@ def color_map_for_core(color_map: CheckedColorMap | None) -> dict[str, Any]:
         "color_map": color_map.name,
         "color_table": color_map.table,
         "color_axis": color_map.axis,
-        "color_by_field": color_map.by != "axis",
+        "color_by_depth": color_map.by == "depth",
+        "color_by_field": color_map.by in BY_FIELD,
         "color_caps_alone": color_map.by == "caps",
         "color_by_label": color_map.by == "labels",
         "color_low": low,

@@ -22,6 +22,7 @@ from isowave._files import (
     source_of_file,
 )
 from isowave._progress import Progress, shown
+from isowave._source_file import SourceFile, source_file
 from isowave._volume import Volume, warn_of_file
 
 
@@ -29,7 +30,7 @@ class OpenArguments(TypedDict, total=False):
     """Arguments of open() beside the path."""
 
     tolerance: float | None
-    relative_tolerance: float | None
+    tolerance_relative: float | None
     rate: int | None
     exact: bool
     shape: Sequence[int] | None
@@ -57,7 +58,7 @@ def dims_of(shape: Sequence[int]) -> tuple[int, int, int]:
 
 def compression_options(
     tolerance: float | None,
-    relative_tolerance: float | None,
+    tolerance_relative: float | None,
     rate: int | None,
     exact: bool,
     levels: int,
@@ -67,8 +68,8 @@ def compression_options(
 ) -> dict[str, Any]:
     return {
         "tolerance": None if tolerance is None else number("tolerance", tolerance),
-        "relative_tolerance": (
-            None if relative_tolerance is None else number("relative_tolerance", relative_tolerance)
+        "tolerance_relative": (
+            None if tolerance_relative is None else number("tolerance_relative", tolerance_relative)
         ),
         "rate": None if rate is None else whole("rate", rate),
         "exact": flag("exact", exact),
@@ -77,7 +78,7 @@ def compression_options(
         "no_data": None if no_data is None else number("no_data", no_data),
         "num_threads": whole("num_threads", num_threads),
         # If nothing bounds the error, it is measured: users ask for it.
-        "measure_error": not exact and tolerance is None and relative_tolerance is None,
+        "measure_error": not exact and tolerance is None and tolerance_relative is None,
     }
 
 
@@ -85,7 +86,7 @@ def compress(
     array: Any,
     *,
     tolerance: float | None = None,
-    relative_tolerance: float | None = None,
+    tolerance_relative: float | None = None,
     rate: int | None = None,
     exact: bool = False,
     spacing: Sequence[float] | None = None,
@@ -113,12 +114,12 @@ def compress(
         tensorstore, SimpleITK, itk, nibabel, pyvista.ImageData.
     tolerance
         Largest error of a voxel [voxel values].
-    relative_tolerance
+    tolerance_relative
         Largest error of a voxel, as a part of the range of values.
     rate
         Bits per voxel, 1 to 32.
     exact
-        Refuse voxels that float32 does not hold. Without tolerance, relative_tolerance and rate,
+        Refuse voxels that float32 does not hold. Without tolerance, tolerance_relative and rate,
         voxels keep all that float32 holds: integers below 2^24 and float32 have no error.
     spacing, origin
         World units between voxels, and position of voxel (0, 0, 0); each (z, y, x). None: what the
@@ -161,11 +162,13 @@ def compress(
     if no_data is None:
         no_data = source.no_data
     options = compression_options(
-        tolerance, relative_tolerance, rate, exact, levels, map_nan, no_data, num_threads
+        tolerance, tolerance_relative, rate, exact, levels, map_nan, no_data, num_threads
     )
     file = None if path is None else os.path.abspath(os.fsdecode(path))
     with shown(progress) as told:
-        return Volume(compressed(array, source, options, file, told), file)
+        volume = Volume(compressed(array, source, options, file, told), file)
+    volume.source = None if file is None else SourceFile(file)
+    return volume
 
 
 def compressed(
@@ -200,7 +203,7 @@ def open(  # noqa: A001: as gzip.open, h5py.File's habit
     path: str | os.PathLike[str],
     *,
     tolerance: float | None = None,
-    relative_tolerance: float | None = None,
+    tolerance_relative: float | None = None,
     rate: int | None = None,
     exact: bool = False,
     shape: Sequence[int] | None = None,
@@ -243,18 +246,22 @@ def open(  # noqa: A001: as gzip.open, h5py.File's habit
     name = os.fsdecode(path)
     is_compressed = name.endswith(".zfp")
     options = compression_options(
-        tolerance, relative_tolerance, rate, exact, levels, map_nan, no_data, num_threads
+        tolerance, tolerance_relative, rate, exact, levels, map_nan, no_data, num_threads
     )
     if is_compressed:
         options["measure_error"] = False
     if is_read_by_packages(name):
         if shape is not None or dtype is not None:
             raise _core.Error(f"{name}: shape and dtype are for raw files; this file has its own")
-        return open_source(name, source_of_file(name, dataset, index, spacing), options, progress)
+        volume = open_source(name, source_of_file(name, dataset, index, spacing), options, progress)
+        volume.source = source_file(name, dataset, index)
+        return volume
     if dataset is not None:
         raise _core.Error(f"{name}: dataset {dataset}: this file has one array, without a name")
     if index is not None:
-        return open_step(name, index, options, spacing)
+        volume = open_step(name, index, options, spacing)
+        volume.source = source_file(name, None, index)
+        return volume
     with shown(progress) as told:
         core = _core.open(
             name,
@@ -265,9 +272,12 @@ def open(  # noqa: A001: as gzip.open, h5py.File's habit
             told,
         )
     warn_of_file(core)
-    if not is_compressed:
-        return Volume(core)
-    return Volume(core, os.path.abspath(name), None if spacing is None else tuple(spacing))
+    volume = Volume(core)
+    if is_compressed:
+        own = None if spacing is None else tuple(spacing)
+        volume = Volume(core, os.path.abspath(name), own)
+    volume.source = source_file(name)
+    return volume
 
 
 def open_source(

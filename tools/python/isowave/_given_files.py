@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -26,10 +25,16 @@ from isowave._files import (
     source_of_file,
     source_of_layers,
 )
+from isowave._source_file import SourceFile, text_of_index
+
+if TYPE_CHECKING:
+    from isowave._given_scene import GivenScene
 
 COMMANDS = ("info", "convert", "render", "extract", "compare")
 FIELD = "--color-by"
 """The option that names a second volume, in its own fields between commas."""
+OPTIONS = ("--dataset", "--index", "--field-dataset", "--field-index")
+"""What they choose: an array of a file, and entries of its further axes."""
 _SLAB_BYTES = 64 << 20
 """About so much of a volume is in memory."""
 _NRRD_TYPES = {"float32": "float", "float64": "double"}
@@ -133,67 +138,92 @@ def take_option(arguments: list[str], name: str) -> str | None:
     return None
 
 
-def name_real_files(scene: str, names_of: Mapping[str, str]) -> None:
-    """Puts the names of files in place of those of their NRRD files, in a scene file."""
-    with open(scene, encoding="utf-8") as file:
-        text = file.read()
-    for nrrd, path in names_of.items():
-        if not os.path.isabs(path):
-            path = os.path.relpath(path, os.path.dirname(os.path.realpath(scene)))
-        text = text.replace(json.dumps(nrrd), json.dumps(path, ensure_ascii=False))
-    with open(scene, "w", encoding="utf-8") as file:
-        file.write(text)
+@dataclass(frozen=True)
+class Chosen:
+    """What options choose in files of several arrays: --dataset, --index, ..."""
+
+    dataset: str | None = None
+    index: str | None = None
+
+
+def take_chosen(arguments: list[str]) -> tuple[Chosen, Chosen]:
+    """Takes the options of the volume's file and of the field's out of the arguments."""
+    dataset, index, of_field, field_index = (take_option(arguments, name) for name in OPTIONS)
+    return Chosen(dataset, index), Chosen(of_field, field_index)
 
 
 def with_nrrd(
     arguments: Sequence[str],
     files: Sequence[Given],
     folder: str,
-    names_of: dict[str, str] | None = None,
+    names_of: dict[str, SourceFile | None] | None = None,
+    scene: GivenScene | None = None,
 ) -> list[str]:
     """Returns the arguments with NRRD files, written to `folder`, in place of these.
 
     --dataset and --index choose in each of them, --field-dataset and --field-index in that of
     --color-by. The program gets --no-data as a file says it. Raises Error in one line.
 
-    names_of  gets the files of these NRRD files
+    names_of  gets the files of these NRRD files; None: of several, which no name says
+    scene     --scene, if files of it are to be such files, too
     """
-    options = [*arguments]
-    names = ("--dataset", "--index", "--field-dataset", "--field-index")
-    dataset, index, of_field, field_index = (take_option(options, name) for name in names)
-    if (of_field or field_index) and not any(each.is_field for each in files):
-        name = "--field-dataset" if of_field else "--field-index"
-        raise Error(f"{name}: no file of {FIELD} has several arrays: leave it out")
-    says = {text.partition("=")[0] for text in options}
+    chosen, of_field = take_chosen([*arguments])
+    has_volume = any(not each.is_field for each in files) or (scene and scene.volume)
+    has_field = any(each.is_field for each in files) or (scene and scene.field)
+    if not has_field and of_field.dataset:
+        raise Error(f"--field-dataset: no file of {FIELD} has several arrays: leave it out")
+    if not has_volume and chosen.dataset:
+        raise Error("--dataset: VOLUME has one array: leave it out")
+    says = {text.partition("=")[0] for text in arguments}
     changed: list[str | None] = [*arguments]
     more: list[str] = []
     real = names_of if names_of is not None else {}
+    spacing = (1.0, 1.0, 1.0) if "--spacing" in says else None  # the program replaces it
     for number, each in enumerate(files):
         paths = arguments[each.at : each.at + each.count] if each.count > 1 else [each.path]
-        if each.is_field:
-            written = _Written(paths, of_field, field_index, None)
-        else:
-            spacing = (1.0, 1.0, 1.0) if "--spacing" in says else None  # the program replaces it
-            written = _Written(paths, dataset, index, spacing)
+        part = of_field if each.is_field else chosen
         takes_no_data = not each.is_field and arguments[0] != "compare"
-        try:
-            nrrd = written.write(os.path.join(folder, str(number)), takes_no_data)
-        except Error as error:
-            raise Error(_in_options(str(error), each.is_field)) from None
+        target = os.path.join(folder, str(number))
+        of_volume = None if each.is_field else spacing
+        nrrd, no_data = as_nrrd(paths, part, of_volume, target, takes_no_data, each.is_field)
         option = f"{FIELD}=" if arguments[each.at].startswith(f"{FIELD}=") else ""
         changed[each.at : each.at + each.count] = [
             f"{option}{nrrd}{each.tail}",
             *(each.count - 1) * [None],
         ]
-        if takes_no_data and written.no_data is not None and "--no-data" not in says:
-            more = ["--no-data", repr(written.no_data)]
-        real[nrrd] = each.path if each.count == 1 else ""
+        if takes_no_data and no_data is not None:
+            more = ["--no-data", repr(no_data)]
+        source = SourceFile(each.path, part.dataset or "", text_of_index(part.index))
+        real[nrrd] = source if each.count == 1 else None
+    if scene is not None:
+        name, no_data = scene.write(folder, chosen, of_field, spacing, real)
+        for at, text in scene.option(name):
+            changed[at] = text
+        more = more or ([] if no_data is None else ["--no-data", repr(no_data)])
     left = [text for text in changed if text is not None]
-    for name in names:
-        take_option(left, name)
-    if "--save-scene" in says and "" in real.values():
+    is_done = {"--index": has_volume, "--field-index": has_field}  # else the program reads the file
+    for name in OPTIONS:
+        if is_done.get(name, True):
+            take_option(left, name)
+    if "--save-scene" in says and None in real.values():
         raise Error("--save-scene: a scene names one volume: put the layers' pattern in quotes")
-    return left + more
+    return left + ([] if "--no-data" in says else more)
+
+
+def as_nrrd(
+    paths: Sequence[str],
+    part: Chosen,
+    spacing: Sequence[float] | None,
+    folder: str,
+    takes_no_data: bool,
+    is_field: bool = False,
+) -> tuple[str, Any]:
+    """Writes a volume, or steps, to a new folder: their name, and the value without data."""
+    written = _Written(paths, part.dataset, part.index, spacing)
+    try:
+        return written.write(folder, takes_no_data), written.no_data
+    except Error as error:
+        raise Error(_in_options(str(error), is_field)) from None
 
 
 def _in_options(message: str, is_field: bool) -> str:

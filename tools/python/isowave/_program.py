@@ -15,7 +15,9 @@ from typing import Any
 
 from isowave import _loader
 from isowave._core import Error
-from isowave._given_files import Given, given_files, name_real_files, take_option, with_nrrd
+from isowave._given_files import Given, given_files, take_option, with_nrrd
+from isowave._given_scene import GivenScene, given_scene, name_real_files, refuse_to_replace
+from isowave._source_file import SourceFile
 from isowave.viewer import command
 
 PROGRAM = _loader.PACKAGE / "bin" / "isowave"
@@ -45,13 +47,20 @@ def main() -> int:
         print(help_text.replace("\n\nExit status:", own), end="")
         return 0
     files = given_files(arguments)
-    if files:
-        return run_with_nrrd(arguments, files)
+    try:
+        scene = given_scene(arguments, files)
+    except Error as error:
+        print(f"isowave: {error}", file=sys.stderr)
+        return 1
+    if files or scene:
+        return run_with_nrrd(arguments, files, scene)
     signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # Python ignores it, which a program inherits
     os.execv(PROGRAM, ["isowave", *arguments])
 
 
-def run_with_nrrd(arguments: Sequence[str], files: Sequence[Given]) -> int:
+def run_with_nrrd(
+    arguments: Sequence[str], files: Sequence[Given], scene: GivenScene | None
+) -> int:
     """Runs the program with NRRD files in place of these. Returns its exit status."""
 
     def stop(*_: Any) -> None:
@@ -60,15 +69,17 @@ def run_with_nrrd(arguments: Sequence[str], files: Sequence[Given]) -> int:
     signal.signal(signal.SIGTERM, stop)
     try:
         with tempfile.TemporaryDirectory(prefix="isowave-") as folder:
-            names_of: dict[str, str] = {}
-            changed = with_nrrd(arguments, files, folder, names_of)
-            scene = take_option([*changed], "--save-scene")
+            names_of: dict[str, SourceFile | None] = {}
+            if scene is not None:
+                refuse_to_replace(scene, arguments)
+            changed = with_nrrd(arguments, files, folder, names_of, scene)
+            saved = take_option([*changed], "--save-scene")
             with subprocess.Popen([PROGRAM, *changed]) as process:
                 signal.signal(signal.SIGINT, lambda *_: None)  # Ctrl-C ends the program, too
                 signal.signal(signal.SIGTERM, lambda *_: process.terminate())
                 status = process.wait()
-            if scene is not None and status == 0:
-                name_real_files(scene, names_of)
+            if saved is not None and status == 0:
+                name_real_files(saved, names_of)
     except (Error, OSError) as error:
         print(f"isowave: {error}", file=sys.stderr)
         return 1

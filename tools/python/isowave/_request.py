@@ -24,7 +24,8 @@ from isowave._checked import (
     whole,
 )
 from isowave._clip import ClipPlane, clip_of
-from isowave._color_map import CheckedColorMap, ColorMap, color_map_for_core, color_map_of
+from isowave._color_map import BY_FIELD, CheckedColorMap, ColorMap, color_map_for_core
+from isowave._color_map import color_map_of
 from isowave._progress import Progress as Told
 from isowave._slice import Slice, slice_map_for_core, slice_map_of, slices_of
 from isowave._surface import MAX_SURFACES, Color, Surface, color_of, surface_for_core, surfaces_of
@@ -208,7 +209,7 @@ class Request:
         surfaces = checked["surfaces"]
         if surfaces and self.color is not None:
             raise ValueError("color: surfaces have colours of their own")
-        by_field = checked["color_map"] is not None and checked["color_map"].by != "axis"
+        by_field = checked["color_map"] is not None and checked["color_map"].by in BY_FIELD
         if self.color_map is not None and self.color is not None and not by_field:
             raise ValueError("color: the colour map colours surfaces")
         if len({bool(surface.labels) for surface in surfaces}) == 2:
@@ -245,7 +246,7 @@ class Request:
     def needs_field(self) -> bool:
         """Whether a renderer needs a field to draw this."""
         color_map = color_map_of(self.color_map)
-        return "field" in self.outputs or (color_map is not None and color_map.by != "axis")
+        return "field" in self.outputs or (color_map is not None and color_map.by in BY_FIELD)
 
     @property
     def shows_volume(self) -> bool:

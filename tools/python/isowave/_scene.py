@@ -12,7 +12,8 @@ from isowave._annotate import Annotations, annotations_for_core
 from isowave._camera import Camera, camera_for_core, vector
 from isowave._checked import Isovalue, number
 from isowave._clip import ClipPlane, clip_of
-from isowave._color_map import ColorMap, color_map_for_core, color_map_of
+from isowave._color_map import BY_FIELD, ColorMap, color_map_for_core, color_map_of
+from isowave._files import Index
 from isowave._handed_on import takes
 from isowave._image import Image
 from isowave._levels import Voxels
@@ -25,6 +26,7 @@ from isowave._request import (
     optional_color,
 )
 from isowave._renderer import Renderer
+from isowave._source_file import SourceFile, text_of_index
 from isowave._slice import Slice, slice_map_for_core, slice_map_of, slices_of
 from isowave._surface import Color, Surface, surface_for_core, surfaces_of
 
@@ -233,8 +235,8 @@ class Scene:
             # One opaque surface is drawn with whatever Renderer.render() offers.
             arguments["isovalue"] = first.isovalue
             color_map = color_map_of(self.color_map)
-            by_axis = color_map is not None and color_map.by == "axis"
-            arguments["color"] = None if by_axis else first.color
+            is_whole = color_map is not None and color_map.by not in BY_FIELD
+            arguments["color"] = None if is_whole else first.color
         else:
             arguments["surfaces"] = self.surfaces
         return arguments
@@ -244,7 +246,11 @@ class Scene:
         path: str | os.PathLike[str],
         *,
         volume: str | os.PathLike[str] | None = None,
+        dataset: str | None = None,
+        index: Index | None = None,
         field: str | os.PathLike[str] | None = None,
+        field_dataset: str | None = None,
+        field_index: Index | None = None,
     ) -> None:
         """Writes a scene file, JSON, for open_scene(), `isowave render --scene` and C++.
 
@@ -253,10 +259,13 @@ class Scene:
         path
             The file's name, which ends in .json.
         volume
-            The name of the volume's file, which is then opened with the scene.
-        field
-            The name of the field's file, likewise. "volume": the drawn volume; None: that if the
-            field is the drawn volume.
+            The name of the volume's file, which is then opened with the scene. None: the file, the
+            dataset and the index that the volume was opened from, if it was.
+        dataset, index
+            As open() has them.
+        field, field_dataset, field_index
+            The same of the field's file. "volume": the drawn volume; None: that if the field is
+            the drawn volume.
 
         Raises
         ------
@@ -264,22 +273,28 @@ class Scene:
             A scene that cannot be drawn; a file that cannot be written.
         """
         fields = scene_fields(self)
-        fields["volume"] = None if volume is None else os.fsdecode(volume)
-        if field is not None:
-            fields["field"] = os.fsdecode(field)
+        if volume is not None or dataset is not None or index is not None:
+            fields["volume"] = None if volume is None else os.fsdecode(volume)
+            fields["dataset"], fields["index"] = dataset, text_of_index(index)
+        if field is not None or field_dataset is not None or field_index is not None:
+            fields["field"] = fields["field"] if field is None else os.fsdecode(field)
+            fields["field_dataset"] = field_dataset
+            fields["field_index"] = text_of_index(field_index)
         _core.write_scene(fields, os.fsdecode(path))
 
 
 def scene_fields(scene: Scene) -> dict[str, Any]:
-    """The scene as fields of isowave::Scene, without files. Raises TypeError, ValueError."""
+    """The scene as fields of isowave::Scene. Raises TypeError, ValueError."""
     color_map = color_map_of(scene.color_map)
     field: Any = scene.field
     shows_volume = field is scene.volume or (
         field is None and color_map is not None and color_map.by in ("caps", "labels")
     )
     has_bar = bool(scene.slices) or (color_map is not None and color_map.by != "labels")
+    of_field = {"field": "volume"} if shows_volume else source_fields(field, "field")
     return {
-        "field": "volume" if shows_volume else None,
+        **source_fields(scene.volume, "volume"),
+        **of_field,
         "camera": None if scene.view is None else camera_for_core(camera_of(scene.view)),
         "surfaces": [surface_for_core(each) for each in surfaces_of(scene.surfaces)],
         "slices": [vars(each) for each in slices_of(scene.slices)],
@@ -299,3 +314,12 @@ def scene_fields(scene: Scene) -> dict[str, Any]:
         if scene.annotations is None
         else annotations_for_core(scene.annotations, has_bar),
     }
+
+
+def source_fields(volume: object, name: str) -> dict[str, Any]:
+    """Where a volume came from, as fields of isowave::Scene. name: volume, field"""
+    source = getattr(volume, "source", None)
+    if not isinstance(source, SourceFile):
+        return {name: None}
+    prefix = "" if name == "volume" else f"{name}_"
+    return {name: source.path, f"{prefix}dataset": source.dataset, f"{prefix}index": source.index}

@@ -41,7 +41,8 @@ def open_scene(
     path
         The file's name.
     volume
-        The volume to draw. None: the one that the file names, opened with open()'s `options`.
+        The volume to draw. None: the one that the file names, opened with open()'s `options`, and
+        with the dataset and index that it names unless these are given.
     field
         The second volume, if colours are by one. None: the one that the file names, opened with
         the `options` of compression.
@@ -60,13 +61,15 @@ def open_scene(
         raise _core.Error(f"{os.fsdecode(path)}: it names no field: give field=")
     is_drawn = fields["field"] == "volume" or (volume is None and _is_volume(fields, dict(options)))
     if wants_field and not is_drawn:
-        field = open_field(fields["field"], dict(options))
+        field = open_field(fields["field"], dict(options), **part_of_scene(fields, "field_"))
     title = ""
     if volume is None:
         if not fields["volume"]:
             raise _core.Error(f"{os.fsdecode(path)}: it names no volume: give volume=")
         title = Path(fields["volume"]).name
-        volume = open_volume(fields["volume"], **options)
+        asked = {name: each for name, each in options.items() if each is not None}
+        arguments: dict[str, Any] = {**part_of_scene(fields), **asked}
+        volume = open_volume(fields["volume"], **arguments)
     elif options:
         raise TypeError(f"{', '.join(options)}: the volume is open already")
     drawn: Any = volume
@@ -110,12 +113,20 @@ _OF_ONE_FILE = ("shape", "dtype", "spacing", "dataset", "index")
 
 def _is_volume(fields: dict[str, Any], options: dict[str, Any]) -> bool:
     """Whether the field's file is the scene's volume; not of labels, as `isowave render`."""
+    part = part_of_scene(fields, "field_")
+    if part and part != part_of_scene(fields):
+        return False
     if fields["color_by_label"] or any(options.get(key) is not None for key in _OF_ONE_FILE):
         return False
     try:
         return os.path.samefile(fields["field"], fields["volume"])
     except OSError:
         return False
+
+
+def part_of_scene(fields: dict[str, Any], prefix: str = "") -> dict[str, str]:
+    """What a scene chooses in its volume's file, or in its field's, as arguments of open()."""
+    return {name: fields[prefix + name] for name in ("dataset", "index") if fields[prefix + name]}
 
 
 def open_field(name: str, options: dict[str, Any], **own: Any) -> Volume:
@@ -148,7 +159,7 @@ def color_map_of_scene(fields: dict[str, Any]) -> ColorMap | None:
 
 def colors_by(fields: dict[str, Any]) -> str:
     if not fields["color_by_field"]:
-        return "axis"
+        return "depth" if fields["color_by_depth"] else "axis"
     if fields["color_by_label"]:
         return "labels"
     return "caps" if fields["color_caps_alone"] else "field"

@@ -29,6 +29,7 @@ from isowave._files import (
 from isowave._handed_on import takes
 from isowave._image import Image
 from isowave._request import isovalue_or_surfaces
+from isowave._source_file import SourceFile, as_absolute, source_file
 from isowave._volume import Volume
 
 if TYPE_CHECKING:
@@ -52,6 +53,12 @@ class Series(Sequence[Volume]):
 
     def __len__(self) -> int:
         return len(self.names)
+
+    def source(self, step: int) -> SourceFile | None:
+        """The step's Volume.source, without opening it."""
+        find = getattr(self._load, "source_of", None)
+        found: SourceFile | None = find(step) if find else None
+        return found
 
     @overload
     def __getitem__(self, index: int) -> Volume:
@@ -101,7 +108,7 @@ def open_series(
     source: Any,
     *,
     tolerance: float | None = None,
-    relative_tolerance: float | None = None,
+    tolerance_relative: float | None = None,
     rate: int | None = None,
     exact: bool = False,
     shape: Sequence[int] | None = None,
@@ -126,7 +133,7 @@ def open_series(
         step_10. TIFF files of one picture each are the layers of one step, in natural order. Or
         a file with an axis t beside z, y and x, a list of paths, or an array with the
         axes (t, z, y, x), whose parts array[t] compress() takes.
-    tolerance, relative_tolerance, rate, exact, levels, map_nan, no_data, num_threads
+    tolerance, tolerance_relative, rate, exact, levels, map_nan, no_data, num_threads
         As compress() has them, for each step.
     shape, dtype, spacing, dataset, index
         As open() has them, for files.
@@ -138,7 +145,7 @@ def open_series(
     Error
         No file; one that cannot be opened; one with another grid than the first.
     """
-    options = (tolerance, relative_tolerance, rate, exact, levels, map_nan, no_data, num_threads)
+    options = (tolerance, tolerance_relative, rate, exact, levels, map_nan, no_data, num_threads)
     checked = compression_options(*options)
     places = {"origin": origin, "direction": direction, "fill_value": fill_value}
     placed = {name: each for name, each in places.items() if each is not None}
@@ -174,14 +181,10 @@ def open_series(
         raise TypeError("shape, dtype, dataset and index are for files: the array has its own")
     if len(getattr(source, "shape", ())) != 4:
         raise refuse("source", source, "a pattern, a list of paths or an array (t, z, y, x)")
-    names = (*("tolerance", "relative_tolerance", "rate", "exact"), "levels", "map_nan", "no_data")
+    names = (*("tolerance", "tolerance_relative", "rate", "exact"), "levels", "map_nan", "no_data")
     how = {**dict(zip((*names, "num_threads"), options)), "spacing": spacing, **placed}
     count = int(source.shape[0])
     return Series([f"step {i}" for i in range(count)], ArraySteps(source, how))
-
-
-def as_absolute(path: str) -> str:
-    return path if path.startswith("generate:") else os.path.abspath(path)
 
 
 def is_path(source: Any) -> bool:
@@ -197,6 +200,10 @@ class Chosen:
 
     def __call__(self, step: int) -> Volume:
         return self.load(self.steps[step])
+
+    def source_of(self, step: int) -> Any:
+        find = getattr(self.load, "source_of", None)
+        return find(self.steps[step]) if find else None
 
 
 @dataclass
@@ -219,7 +226,15 @@ class FileSteps:
 
     def __call__(self, step: int) -> Volume:
         with self.lock:
-            return Volume(self.core.open(step))
+            volume = Volume(self.core.open(step))
+        volume.source = self.source_of(step)
+        return volume
+
+    def source_of(self, step: int) -> SourceFile:
+        name, end = self.core.name(step), f", step {step}"
+        if name.endswith(end) and not os.path.exists(name):
+            return source_file(name.removesuffix(end), None, {"t": step})
+        return source_file(name)
 
     def __reduce__(self) -> Any:
         return FileSteps, (self.paths, *self.arguments)
@@ -229,13 +244,15 @@ class FileSteps:
 class ReadSteps:
     """Opens files that packages of Python read.
 
-    steps  files, and entries of their further axes; several files are the layers of a step
+    steps    files, and entries of their further axes; several files are the layers of a step
+    pattern  of such layers; "": there is none
     """
 
     steps: Sequence[tuple[Sequence[str], Index | None]]
     dataset: str | None
     spacing: Sequence[float] | None
     options: dict[str, Any]
+    pattern: str = ""
 
     def __call__(self, step: int) -> Volume:
         files, entries = self.steps[step]
@@ -243,7 +260,14 @@ class ReadSteps:
             source = source_of_layers(files, entries, self.spacing)
         else:
             source = source_of_file(files[0], self.dataset, entries, self.spacing)
-        return open_source(files[0], source, self.options, progress=False)
+        volume = open_source(files[0], source, self.options, progress=False)
+        volume.source = self.source_of(step)
+        return volume
+
+    def source_of(self, step: int) -> SourceFile | None:
+        files, entries = self.steps[step]
+        name = self.pattern if len(files) > 1 else files[0]
+        return source_file(name, self.dataset, entries) if name else None
 
 
 def of_read_files(
@@ -263,7 +287,8 @@ def of_read_files(
             raise _core.Error(f"{paths[0]}: dataset {dataset}: layers are one array")
         name = paths[0] if len(paths) == 1 else f"{files[0]} to {os.path.basename(files[-1])}"
         layers = [as_absolute(file) for file in files]
-        return Series([name], ReadSteps([(layers, index)], None, spacing, options))
+        pattern = paths[0] if len(paths) == 1 else ""
+        return Series([name], ReadSteps([(layers, index)], None, spacing, options, pattern))
     steps = [(file, file, index) for file in files]
     along = steps_of_file(files[0], dataset, index)
     if along is not None and len(files) == 1:

@@ -34,6 +34,7 @@ from isowave._renderer import (
 )
 from isowave._request import FrameArguments, Request, isovalue_or_surfaces, request_of
 from isowave._scene import Scene
+from isowave._source_file import SourceFile
 from isowave._surface import Surface
 
 if TYPE_CHECKING:
@@ -89,6 +90,8 @@ class Volume(Voxels):
         """file: the .zfp that has the voxels; spacing: given to open(), in place of the file's."""
         super().__init__(core)
         self._file, self._file_spacing = file, spacing
+        #: The file that it was opened from, for scenes: path, dataset, index; None: an array
+        self.source: SourceFile | None = None
         self._lock = Turns()
         self._renderer: Renderer | None = None
         self._made_with: dict[str, Any] = {}
@@ -96,11 +99,11 @@ class Volume(Voxels):
 
     def __reduce__(self) -> tuple[Callable[..., Volume], tuple[Any, ...]]:
         if self._file is not None:
-            return open_again, (self._file, self._file_spacing)
+            return open_again, (self._file, self._file_spacing, self.source)
         with tempfile.TemporaryDirectory() as folder:
             path = pathlib.Path(folder, "volume.zfp")
             self.save(path)
-            return from_bytes, (path.read_bytes(),)
+            return from_bytes, (path.read_bytes(), self.source)
 
     @takes(Renderer, without=("volume",))
     def renderer(self, **options: Unpack[RendererArguments]) -> Renderer:
@@ -438,21 +441,25 @@ def labels_wanted(surfaces: Sequence[Surface]) -> dict[str, Any]:
     return {"labels": True, "surfaces": len(surfaces)} if has_labels else {}
 
 
-def open_again(path: str, spacing: tuple[float, ...] | None) -> Volume:
+def open_again(path: str, spacing: tuple[float, ...] | None, source: SourceFile | None) -> Volume:
     """Opens a pickled volume of a file."""
     core = _core.open(
         path, {}, None, None, None if spacing is None else reversed_axes(spacing), None
     )
     warn_of_file(core)
-    return Volume(core, path, spacing)
+    volume = Volume(core, path, spacing)
+    volume.source = source
+    return volume
 
 
-def from_bytes(data: bytes) -> Volume:
+def from_bytes(data: bytes, source: SourceFile | None) -> Volume:
     """Opens a pickled volume of memory, which then stays in a file without a name."""
     with tempfile.TemporaryDirectory() as folder:
         path = pathlib.Path(folder, "volume.zfp")
         path.write_bytes(data)
-        return Volume(_core.open(path, {}, None, None, None, None))
+        volume = Volume(_core.open(path, {}, None, None, None, None))
+    volume.source = source
+    return volume
 
 
 def warn_of_file(core: _core.Volume) -> None:

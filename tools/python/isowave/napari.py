@@ -168,7 +168,7 @@ def open_with_levels(path: str) -> Volume:
         return open(path, exact=True, levels=0, progress=False)
     except Error:  # float32 does not hold the values, or no volume: the next open() then fails
         pass
-    return open(path, relative_tolerance=2**-16, levels=0, progress=False)
+    return open(path, tolerance_relative=2**-16, levels=0, progress=False)
 
 
 def add_isosurface(

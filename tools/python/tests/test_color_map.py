@@ -189,5 +189,5 @@ def test_fields_are_refused_in_one_line(volume):
             renderer.render(6, **arguments)
     with pytest.raises(TypeError, match="field"):
         volume.renderer(size=SIZE, field="other")
-    with pytest.raises(ValueError, match="axis, field, caps, labels"):
+    with pytest.raises(ValueError, match="axis, depth, field, caps, labels"):
         renderer.render(6, color_map=isowave.ColorMap(by="time"))

@@ -278,6 +278,91 @@ def test_a_field_is_chosen_by_its_name(folder, monkeypatch, name):
     )
 
 
+LOOK = ("--device", "host", "--size", "32x24")
+
+
+def test_a_scene_of_files_of_packages(folder, monkeypatch):
+    """The program gets NRRD files in place of those that the scene names."""
+    monkeypatch.chdir(folder)
+    two_datasets(folder / "a.h5")
+    (folder / "scenes").mkdir()
+    by = ("--color-by", "a.h5,0,40", "--field-dataset", "s/heat")
+    render = ("render", "a.h5", "--dataset", "s/ct", "-i", 20, *by, *LOOK)
+    save = ("--save-scene", "scenes/s.json")
+    assert command(*render, "-o", "a.png", *save).returncode == 0
+    fields = json.loads(pathlib.Path("scenes/s.json").read_text())
+    names = ("volume", "dataset", "field", "field_dataset")
+    assert [fields[each] for each in names] == ["../a.h5", "s/ct", "../a.h5", "s/heat"]
+    for scene in (("--scene", "scenes/s.json"), ("--scene=scenes/s.json",)):
+        again = ("--save-scene", "t.json")
+        done = command("render", *scene, *LOOK, "-o", "b.png", *again)
+        assert done.returncode == 0, done.stderr
+        assert pathlib.Path("a.png").read_bytes() == pathlib.Path("b.png").read_bytes()
+        fields = json.loads(pathlib.Path("t.json").read_text())
+        assert [fields[each] for each in names] == ["a.h5", "s/ct", "a.h5", "s/heat"]
+    scene = ("--scene", "scenes/s.json")
+    # Options choose others, and VOLUME another file.
+    done = command("render", *scene, *LOOK, "-o", "b.png", "--dataset", "s/heat")
+    assert done.returncode == 0, done.stderr
+    assert pathlib.Path("a.png").read_bytes() != pathlib.Path("b.png").read_bytes()
+    done = command("render", *scene, *LOOK, "-o", "b.png", "--field-dataset", "absent")
+    assert done.returncode == 1 and "absent" in done.stderr and done.stderr.count("\n") == 1
+    np.save("b.npy", VOXELS[::-1])
+    nrrd(folder / "b.nrrd", VOXELS[::-1].astype("uint8"))
+    for other in ("b.npy", "b.nrrd"):
+        done = command("render", other, *scene, *LOOK, "-o", "b.png", *again)
+        assert done.returncode == 0, done.stderr
+        assert pathlib.Path("a.png").read_bytes() != pathlib.Path("b.png").read_bytes()
+        fields = json.loads(pathlib.Path("t.json").read_text())
+        assert fields["volume"] == other and "dataset" not in fields
+        assert fields["field_dataset"] == "s/heat"
+    done = command("render", *scene, *LOOK, "-o", "b.png", "--save-scene", "scenes/s.json")
+    assert done.stderr == (
+        "isowave: --save-scene: scenes/s.json would take the place of the input scenes/s.json\n"
+    )
+
+
+def test_scenes_that_cannot_be_are_one_line(folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    two_datasets(folder / "a.h5")
+    nrrd(folder / "b.nrrd", VOXELS.astype("uint8"))
+
+    def refused(**more):
+        scene = {"isowave_scene": 1, "surfaces": [{"isovalue": 20}], **more}
+        pathlib.Path("s.json").write_text(json.dumps(scene))
+        done = command("render", "--scene", "s.json", *LOOK, "-o", "c.png")
+        assert done.returncode == 1 and not pathlib.Path("c.png").exists()
+        return done.stderr
+
+    assert "choose one by --dataset" in refused(volume="a.h5")
+    assert refused(volume="b.nrrd", dataset="ct") == (
+        "isowave: b.nrrd: dataset ct: this file has one array, without a name\n"
+    )
+    assert "absent" in refused(volume="a.h5", dataset="absent")
+    assert "index c=1" in refused(volume="a.h5", dataset="s/ct", index="c=1")
+    assert refused(volume="none.h5").count("\n") == 1
+
+
+def test_an_index_of_the_programs_files_goes_on_to_it(folder, monkeypatch):
+    """Beside a file of packages."""
+    monkeypatch.chdir(folder)
+    np.save("heat.npy", VOXELS[::-1])
+    steps = [VOXELS.astype("uint8"), VOXELS.astype("uint8") + 9]
+    sizes = " ".join(map(str, reversed(VOXELS.shape)))
+    head = f"NRRD0004\ntype: uint8\nencoding: raw\ndimension: 4\nsizes: {sizes} 2\n\n"
+    pathlib.Path("four.nrrd").write_bytes(head.encode() + b"".join(s.tobytes() for s in steps))
+    nrrd(folder / "one.nrrd", steps[1])
+    found = []
+    for volume in (("four.nrrd", "--index", "t=1"), ("one.nrrd",)):
+        by = ("--color-by", "heat.npy,0,40")
+        done = command("render", *volume, *by, "-i", 20, *LOOK, "-o", "a.png")
+        assert done.returncode == 0, done.stderr
+        found.append(pathlib.Path("a.png").read_bytes())
+    assert found[0] == found[1]
+    done = command("render", "one.nrrd", "--dataset", "x", *by, *LOOK, "-o", "a.png")
+    assert done.stderr == "isowave: --dataset: VOLUME has one array: leave it out\n"
+
+
 def test_the_program_compares_files_of_packages(folder, monkeypatch):
     h5py = pytest.importorskip("h5py")
 
@@ -384,9 +469,9 @@ def test_names_of_options_agree(capsys):
     text = command("render", "--help").stdout
     of_render = set(re.findall(r"--[a-z][-a-z]*", text)) | {"--dataset", "--field-dataset"}
     options = {o for each in make_parser()._actions for o in each.option_strings}
-    of_page = {"--host", "--port", "--max-clients", "--max-rays", "--no-browser", "--field"}
+    of_page = {"--host", "--port", "--max-clients", "--max-rays", "--no-browser"}
     assert {each for each in options if each.startswith("--")} - of_page <= of_render
-    python = {"--dims": "shape", "--type": "dtype", "--tolerance-relative": "relative_tolerance"}
+    python = {"--dims": "shape", "--type": "dtype", "--tolerance-relative": "tolerance_relative"}
     names = {name.replace("-", "_").strip("_") for name in of_render} | {*python.values()}
     assert {*inspect.signature(isowave.open).parameters} - {"path"} <= names | {
         "map_nan",  # of convert

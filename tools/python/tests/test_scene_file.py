@@ -5,12 +5,14 @@ from __future__ import annotations
 import dataclasses
 import json
 import pathlib
+import pickle
 from typing import Any
 
 import numpy as np
 import pytest
 
 import isowave
+from isowave._source_file import source_file
 
 SIZE = (48, 36)
 CAMERA = isowave.Camera((40, 30, 60), (8, 8, 8))
@@ -216,3 +218,74 @@ def test_what_is_wrong_is_one_line(ball: isowave.Volume, tmp_path: pathlib.Path)
     with pytest.raises(isowave.Error, match="scene.json: an opacity of 7") as caught:
         isowave.open_scene(file, volume=ball)
     assert "\n" not in str(caught.value)
+
+
+def test_scenes_keep_the_part_of_a_file(tmp_path: pathlib.Path) -> None:
+    """Dataset and index of volume and field, from the file that these were opened from."""
+    h5py = pytest.importorskip("h5py")
+    z, y, x = np.mgrid[0:9, 0:10, 0:11]
+    voxels = np.stack([z + 2 * y + x * t for t in range(3)]).astype(np.float32)
+    with h5py.File(tmp_path / "run.h5", "w") as file:
+        file["a/ct"], file["a/heat"] = voxels, voxels[:, ::-1]
+    parts: Any = {"dataset": "a/ct", "index": {"t": 2}}
+    volume = isowave.open(tmp_path / "run.h5", **parts)
+    heat = isowave.open(tmp_path / "run.h5", dataset="a/heat", index="t=1")
+    by_field = isowave.ColorMap("magma", by="field")
+    scene = volume.scene().surface(20).look(color_map=by_field, field=heat)
+    file = tmp_path / "scene.json"
+    of_field = {"field_dataset": "a/heat", "field_index": "t=1"}
+    given = {"dataset": "a/ct", "index": "t=2", **of_field}
+    name = tmp_path / "run.h5"
+    scene.save(file)
+    saved = isowave._core.read_scene(str(file))
+    assert saved["volume"] == saved["field"] == str(name)
+    assert {key: saved[key] for key in given} == given
+    text = file.read_text()
+    scene.save(file, volume=name, field=name, **given)  # type: ignore[arg-type]
+    assert isowave._core.read_scene(str(file)) == saved
+    read = isowave.open_scene(file)
+    assert np.array_equal(picture(read), picture(scene)) and read.field is not read.volume
+    read.save(file)
+    assert file.read_text() == text
+    # Arguments choose others.
+    other: Any = isowave.open_scene(file, index="t=1")
+    assert (other.volume.source.dataset, other.volume.source.index) == ("a/ct", "t=1")
+    # A pickled volume knows it, too; what was made of an array does not.
+    assert pickle.loads(pickle.dumps(volume)).source == volume.source
+    assert isowave.compress(voxels[0]).source is None
+    scene.save(file, volume=tmp_path / "other.h5")
+    assert isowave._core.read_scene(str(file))["dataset"] == "", "that of another file"
+    with pytest.raises(isowave.Error, match="dataset: the scene names no file of the volume"):
+        isowave.compress(voxels[0]).scene().surface(3).save(file, dataset="ct")
+
+
+def test_steps_of_series_know_their_file(tmp_path: pathlib.Path) -> None:
+    voxels = np.arange(8 * 8 * 8 * 3).reshape(3, 8, 8, 8).astype(np.uint16)
+    head = "NRRD0004\ntype: uint16\nencoding: raw\nendian: little\ndimension: 4\nsizes: 8 8 8 3\n\n"
+    four = tmp_path / "four.nrrd"
+    four.write_bytes(head.encode() + voxels.tobytes())
+    series = isowave.open_series(four)
+    found = [series.source(step) for step in range(3)]
+    assert found == [source_file(str(four), None, {"t": step}) for step in range(3)]
+    assert series[1:][1].source == series[1:].source(1) == found[2]
+    assert isowave.open(four, index="t=1").source == found[1]
+    for step in range(2):
+        isowave.compress(voxels[step]).save(tmp_path / f"s_{step}.zfp")
+    files = isowave.open_series(str(tmp_path / "s_*.zfp"))
+    assert files.source(1) == source_file(str(tmp_path / "s_1.zfp")) == files[1].source
+    assert isowave.open_series(voxels).source(0) is None
+
+
+def test_depth_follows_the_view(ball: isowave.Volume, tmp_path: pathlib.Path) -> None:
+    color_map = isowave.ColorMap("magma", by="depth")
+    scene = ball.scene().surface(3).look(color_map=color_map).seen_from(CAMERA)
+    away = tuple(a - b for a, b in zip(CAMERA.at, CAMERA.eye))
+    along = scene.look(color_map=isowave.ColorMap("magma", away))
+    assert np.array_equal(picture(scene), picture(along))
+    scene.save(tmp_path / "scene.json")
+    read = isowave.open_scene(tmp_path / "scene.json", volume=ball)
+    side = isowave.Camera((60, 8, 8), (8, 8, 8))
+    turned = read.seen_from(side)
+    beside = scene.look(color_map=isowave.ColorMap("magma", (-1, 0, 0))).seen_from(side)
+    assert np.array_equal(picture(turned), picture(beside))
+    assert not np.array_equal(picture(turned), picture(along.seen_from(side)))

@@ -216,7 +216,7 @@ def test_the_focus_goes_through_everything_in_order_and_is_seen(page: Any) -> No
     expected += "".join(f" clip_{axis}_from clip_{axis}_to" for axis in "xyz")
     expected += " add_plane caps slice_x slice_y slice_z colour_by color_map preset background"
     expected += " summary light gradient summary scale-bar axes caption units title"
-    expected += " summary max_error by samples ambient time_budget budget"
+    expected += " summary max_error by samples ambient voxel_pixels time_budget budget"
     assert seen == expected.split()
 
 

@@ -73,7 +73,7 @@ def test_the_command_line_says_what_the_program_does_of_volumes(
         "shape": (6, 5, 4),
         "dtype": "uint8",
         "spacing": (3, 2, 1),
-        "relative_tolerance": 0.1,
+        "tolerance_relative": 0.1,
         "levels": 0,
     }
     words = "a.raw --dims 4 --type uint8 --spacing 2"

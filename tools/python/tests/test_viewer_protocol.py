@@ -72,6 +72,10 @@ def test_messages_are_read() -> None:
     timed = check({**WISH, "max_error": None, "time_budget": 50})
     assert isinstance(timed, Wish) and timed.request.time_budget == 0.05  # ms to seconds
     assert timed.request.by == "proof"  # there is no error to judge
+    coarse = check({**WISH, "max_error": None, "time_budget": 50, "voxel_pixels": 2})
+    assert isinstance(coarse, Wish) and coarse.request.voxel_pixels == 2
+    deep = check({**WISH, "color_map": {**COLOR_MAP, "by": "depth"}})
+    assert isinstance(deep, Wish) and deep.request.color is None and not deep.request.needs_field
     seen = check({**WISH, "by": "picture", "max_error": 0.01})
     assert isinstance(seen, Wish) and seen.request.max_image_error == 0.01
     assert (seen.request.max_error, seen.request.by, seen.request.samples) == (None, "proof", 2)
@@ -150,8 +154,8 @@ BAD_WISHES: list[tuple[dict[str, Any], str]] = [
     ({"caps": 1}, "caps must be true or false"),
     ({"color_map": "magma"}, "color_map must have colors, by, axis and range"),
     ({"color_map": {**COLOR_MAP, "more": 1}}, "color_map must have colors, by, axis and range"),
-    ({"color_map": {**COLOR_MAP, "by": "time"}}, "by of color_map must be one of axis, field"),
-    ({"color_map": {**COLOR_MAP, "by": ["axis"]}}, "by of color_map must be one of axis, field"),
+    ({"color_map": {**COLOR_MAP, "by": "time"}}, "by of color_map must be one of axis, depth, field"),
+    ({"color_map": {**COLOR_MAP, "by": ["axis"]}}, "by of color_map must be one of axis, depth, field"),
     (
         {"color_map": {**COLOR_MAP, "by": "field"}, "max_error": None, "time_budget": 9},
         "colours by the field are drawn without time_budget",
@@ -253,6 +257,9 @@ BAD_WISHES: list[tuple[dict[str, Any], str]] = [
     ({"by": "picture", "slices": [SLICE]}, "slices are drawn without max_error"),
     ({"max_error": None, "time_budget": 0.5}, "time_budget"),
     ({"max_error": 1, "time_budget": 100}, "not both"),
+    ({"voxel_pixels": 1}, "voxel_pixels comes without max_error and labels"),
+    ({"max_error": None, "voxel_pixels": None}, "voxel_pixels must be a number from 0 to 1000"),
+    ({"max_error": None, "voxel_pixels": -1}, "voxel_pixels must be a number from 0 to 1000"),
     ({"camera": []}, "camera"),
     ({"camera": {**CAMERA, "more": 1}}, "camera"),
     ({"camera": {**CAMERA, "eye": [0, 0, 0]}}, "the same point"),

@@ -13,6 +13,7 @@ from browser_pages import (  # noqa: F401
     button,
     fake_scene,
     keep,
+    menu,
     open_page,
     rests,
     state,
@@ -149,6 +150,70 @@ def test_a_real_renderer_keeps_the_error(device: str) -> None:
     assert detail["voxel_pixels"] == eye.client.voxel_pixels > 0, "a ball is smooth"
     assert 0 < eye.of_type("bounds")[-1]["within_pixel"] <= 1
     scene.close()
+
+
+@pytest.mark.parametrize("levels", [1, 3])
+def test_coarser_levels_are_drawn_where_there_are_some(levels: int) -> None:
+    clock, volume = Clock(), FakeVolume(num_levels=levels)
+    scene = make_scene(volume, clock)
+    eye = Eye(scene)
+    eye.wish(size=(64, 48), voxel_pixels=2.0)
+    look(eye, clock)
+    drawn = [frame.request.voxel_pixels for frame in volume.frames]
+    assert drawn == ([2, 2, 0.5] if levels > 1 else [0, 0, 0]), "bounds are of what is drawn"
+    assert not eye.of_type("error") and eye.of_type("welcome")[-1]["levels"] == levels
+
+
+def test_the_page_asks_for_levels_of_detail(open_page: Callable[..., Any]) -> None:  # noqa: F811
+    volume = FakeVolume(num_levels=3)
+    with Server(fake_scene(volume)) as server:
+        page = open_page()
+        page.goto(server.url)
+        voxels, facts = page.get_by_label("Voxels up to"), page.locator(".facts")
+        asked(page, volume)
+        type_into(voxels, "1.5")
+        page.keyboard.press("Enter")
+        assert asked(page, volume).voxel_pixels == 1.5 and state(page)["voxels"] == "1.5"
+        assert "voxels up to 1.5 px apart" in facts.inner_text()
+        assert not page.locator(".of_levels").is_visible()
+        command = menu(page, "export").get_by_label("The same picture").input_value()
+        assert "--voxel-pixels 1.5 " in command
+        # With a time, too; an error comes in place of it.
+        type_into(page.get_by_label("Time per picture"), "200")
+        page.keyboard.press("Enter")
+        request = asked(page, volume)
+        assert (request.voxel_pixels, request.time_budget) == (1.5, 0.2)
+        page.reload()
+        assert asked(page, volume).voxel_pixels == 1.5
+        type_into(page.get_by_label("Accurate to"), "2")
+        page.keyboard.press("Enter")
+        request = asked(page, volume)
+        assert (request.voxel_pixels, request.max_error) == (0, 2)
+        assert voxels.input_value() == "" and "voxels" not in state(page)
+        type_into(voxels, "4")
+        page.keyboard.press("Enter")
+        request = asked(page, volume)
+        assert (request.voxel_pixels, request.max_error) == (4, None)
+        for text in ("0", "-1", "2000"):
+            type_into(voxels, text)
+            page.keyboard.press("Enter")
+            assert voxels.evaluate("e => e.matches(':invalid')"), text
+        type_into(voxels, "")
+        page.keyboard.press("Enter")
+        assert asked(page, volume).voxel_pixels == 0 and page.problems == []
+
+
+def test_a_volume_of_one_level_says_how_to_get_more(
+    open_page: Callable[..., Any]  # noqa: F811
+) -> None:
+    volume = FakeVolume()
+    with Server(fake_scene(volume)) as server:
+        page = open_page()
+        page.goto(f"{server.url}#voxels=3")
+        assert asked(page, volume).voxel_pixels == 0
+        page.locator("details:has(.of_levels)").evaluate("e => { e.open = true; }")
+        assert page.get_by_label("Voxels up to").is_disabled()
+        assert "--levels all" in page.locator(".of_levels").inner_text()
 
 
 def test_the_page_asks_for_an_error_of_the_picture(

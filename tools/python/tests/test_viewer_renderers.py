@@ -292,7 +292,7 @@ def test_renderers_are_made_with_the_field() -> None:
     clock, volume, field = Clock(), FakeVolume(), FakeVolume(value_range=(-5.0, math.inf))
     scene = make_scene(volume, clock, size=(64, 48), field=field, field_name="heat.zfp")
     eye = Eye(scene)
-    told = {"name": "heat.zfp", "range": [-5, None], "labels": False}
+    told = {"name": "heat.zfp", "range": [-5, None], "labels": False, "source": None}
     assert eye.of_type("welcome")[-1]["field"] == told
     by_field: dict[str, Any] = {"color_map": ColorMap("magma", by="field")}
     eye.wish(size=(64, 48), **by_field)

@@ -16,6 +16,7 @@ from browser_pages import (  # noqa: F401
     fake_scene,
     keep,
     open_file,
+    menu,
     open_page,
     open_scene,
     rests,
@@ -32,6 +33,7 @@ from viewer_scenes import Clock, make_scene
 import isowave
 from isowave import ClipPlane, _scene_file
 from isowave._color_map import color_map_of
+from isowave._source_file import SourceFile
 from isowave.viewer import command, view
 from isowave.viewer import server as server_module
 from isowave.viewer.protocol import PageFile, SceneFile
@@ -100,6 +102,68 @@ def test_files_are_opened_and_saved(open_page: Callable[..., Any]) -> None:  # n
         assert again.camera == request.camera and again.color_map == wanted
         assert again.light == request.light and again.background_top == (1, 0, 0)
         assert not page.problems
+
+
+def test_a_saved_scene_gives_the_state_back(open_page: Callable[..., Any]) -> None:  # noqa: F811
+    """Also colours by depth, which follow the view, and the box; and undo that before."""
+    volume = FakeVolume()
+    with Server(fake_scene(volume)) as server:
+        page = open_page()
+        page.goto(server.url)
+        rests(page)
+        page.get_by_label("Depth", exact=True).check()
+        page.get_by_label("x from", exact=True).fill("20.5")
+        page.get_by_label("z to", exact=True).fill("77")
+        page.get_by_role("button", name="Add plane").click()
+        page.locator("[name=background]").evaluate(
+            "e => { e.value = '#ffffff'; e.dispatchEvent(new Event('input')); }"
+        )
+        rests(page)
+        before, text = state(page), saved_scene(page)
+        fields = isowave._core.parse_scene(text)
+        assert fields["color_by_depth"] and not fields["color_by_field"]
+        assert len(fields["clip"]) == 3 and before["map"] == "viridis,depth"
+        page.get_by_label("One", exact=True).check()
+        page.get_by_role("button", name="Remove plane 1").click()
+        page.get_by_label("x from", exact=True).fill("0")
+        page.get_by_label("z to", exact=True).fill("100")
+        page.locator(".picture").press("3")
+        rests(page)
+        other = state(page)
+        assert other != before
+        open_scene(page, text)
+        rests(page)
+        assert state(page) == before
+        page.locator("[name=undo]").click()
+        rests(page)
+        assert state(page) == other
+        page.locator("[name=redo]").click()
+        rests(page)
+        assert state(page) == before and saved_scene(page) == text
+        assert not page.problems
+
+
+def test_a_saved_scene_names_the_files(open_page: Callable[..., Any]) -> None:  # noqa: F811
+    volume = FakeVolume(source=SourceFile("/data/run.h5", "scan/ct", "t=3,c=0"))
+    heat = FakeVolume(source=SourceFile("/data/heat.h5", "T", "t=1"))
+    with Server(fake_scene(volume, field=heat)) as server:
+        page = open_page()
+        page.goto(server.url)
+        rests(page)
+        parts = ("volume", "dataset", "index", "field", "field_dataset", "field_index")
+
+        def saved() -> list[str]:
+            fields = isowave._core.parse_scene(saved_scene(page))
+            return [fields[name] for name in parts]
+
+        of_volume = ["/data/run.h5", "scan/ct", "t=3,c=0"]
+        assert saved() == [*of_volume, "", "", ""]
+        page.get_by_label("Field", exact=True).check()
+        rests(page)
+        assert saved() == [*of_volume, "/data/heat.h5", "T", "t=1"]
+        text = menu(page, "export").get_by_label("The same picture").input_value()
+        assert "\nisowave render --scene ball_80.json --size" in text
+        assert '"dataset":"scan/ct"' in text
 
 
 def test_bad_files_are_one_line_and_change_nothing(
@@ -455,16 +519,16 @@ def test_the_command_takes_scenes(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="names no volume"):
         fields("--scene", str(file))
     assert len(fields("head.nrrd", "--scene", str(file))["surfaces"]) == 2
-    with pytest.raises(ValueError, match="leave out --isovalue"):
-        fields("head.nrrd", "--scene", str(file), "-i", "5")
+    for option in (("--isovalue", "5"), ("--color-by", "z"), ("--color-map", "gray")):
+        with pytest.raises(ValueError, match=f"{option[0]}: --scene says what is drawn"):
+            fields("head.nrrd", "--scene", str(file), *option)
     file.write_text(json.dumps({**SCENE, "volume": "head.nrrd"}))
     assert fields("--scene", str(file))["volume"] == str(tmp_path / "head.nrrd")
     json.dumps(fields("--scene", str(file)))  # as the page gets it
     by_field = {**SCENE, "volume": "head.nrrd", "color_by_field": True}
     file.write_text(json.dumps(by_field))
-    with pytest.raises(ValueError, match="names no field: give --field"):
+    with pytest.raises(ValueError, match='it names none: add "field", a file'):
         fields("--scene", str(file))
-    fields("--scene", str(file), "--field", "heat.nrrd")
     file.write_text("{}")
     with pytest.raises(isowave.Error, match="isowave_scene"):
         fields("--scene", str(file))
@@ -492,19 +556,35 @@ def test_the_command_takes_a_field(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr(command, "open_volume", open_any)
     monkeypatch.setattr(_scene_file, "open_volume", open_any)
-    assert served("head.nrrd")["field"] is None
-    given = served("head.raw", "--field", "heat.nrrd", "--rate", "8", "--spacing", "2")
+    monkeypatch.chdir(tmp_path)
+    for name in ("heat.nrrd", "heat.zfp", "1,2"):
+        Path(name).touch()
+    given = served("head.nrrd")
+    assert given["field"] is None and given["color_map"] is None
+    given = served("head.raw", "--color-by", "heat.nrrd", "--rate", "8", "--spacing", "2")
     assert opened == [("heat.nrrd", {"rate": 8}), ("head.raw", {"rate": 8, "spacing": (2, 2, 2)})]
     assert given["field"] is not given["volume"] and given["field_name"] == "heat.nrrd"
-    given = served("head.raw", "--field", "heat.zfp", "--rate", "8")
+    assert color_map_of(given["color_map"]) == color_map_of(isowave.ColorMap(by="field"))
+    given = served("head.raw", "--color-by", "heat.zfp,0,40", "--rate", "8", "--color-map", "gray")
     assert opened[0] == ("heat.zfp", {}), "it is compressed already"
-    given = served("head.nrrd", "--field", "volume")
+    ranged = isowave.ColorMap("gray", range=(0, 40), by="field")
+    assert color_map_of(given["color_map"]) == color_map_of(ranged)
+    given = served("head.nrrd", "--color-by", "volume")
     assert given["field"] is given["volume"] and len(opened) == 1
+    assert served("head.nrrd", "--color-by", "1,2")["field_name"] == "1,2"
     file = tmp_path / "scene.json"
     scene = {**SCENE, "volume": "head.nrrd", "field": "heat.nrrd", "color_by_field": True}
     file.write_text(json.dumps(scene))
     assert served("--scene", str(file))["field_name"] == "heat.nrrd"
-    assert served("--scene", str(file), "--field", "wind.zfp")["field_name"] == "wind.zfp"
+    parts = {"dataset": "ct", "index": "t=3", "field_dataset": "T", "field_index": "t=1"}
+    file.write_text(json.dumps({**scene, **parts}))
+    served("--scene", str(file), "--field-index", "t=2")
+    assert opened == [
+        ("heat.nrrd", {"dataset": "T", "index": "t=2"}),
+        ("head.nrrd", {"dataset": "ct", "index": "t=3"}),
+    ]
+    served("other.nrrd", "--scene", str(file))
+    assert opened[1] == ("other.nrrd", {}), "they are of the scene's volume"
     file.write_text(json.dumps({**scene, "color_by_field": False}))
     assert served("--scene", str(file))["field"] is None, "its colours do not need it"
 

@@ -313,7 +313,7 @@ def test_caps_show_each_steps_own_values() -> None:
     clock, balls = Clock(), Balls(2)
     scene = series_scene(balls, clock, field=balls.series)
     eye = StepEye(scene)
-    told = {"name": "volume", "range": [0, 255], "labels": True}
+    told = {"name": "volume", "range": [0, 255], "labels": True, "source": None}
     assert eye.of_type("welcome")[0]["field"] == told
     eye.look(1, color_map=isowave.ColorMap("gray", by="caps"))
     run(scene)
@@ -480,7 +480,7 @@ def test_the_command_takes_series(
         assert given["volume"][1].bits_per_voxel == 8
     one = served(str(tmp_path / "s_11.nrrd"))
     assert isinstance(one["volume"], isowave.Volume) and one["title"] == "s_11.nrrd"
-    assert served(pattern, "--field", "volume")["field"] is not None
+    assert served(pattern, "--color-by", "volume")["field"] is not None
     # Scenes say how a series looks; one with a field says too much.
     scene = {"isowave_scene": 1, "surfaces": [{"isovalue": 50}], "volume": "s_*.nrrd"}
     heat = {"color_map": "gray", "color_by_field": True, "field": "all.nrrd"}
@@ -493,7 +493,7 @@ def test_the_command_takes_series(
     capsys.readouterr()
     smaller = nrrd(tmp_path / "small.nrrd", arrays[0][:-1])
     for arguments, why in (
-        ([pattern, "--field", files[0]], "a series has no second volume to colour by"),
+        ([pattern, "--color-by", files[0]], "a series has no second volume to colour by"),
         (["--scene", str(by_field)], "a series has no second volume to colour by"),
         ([str(tmp_path / "t_*.nrrd")], "no file has such a name"),
         ([files[0], smaller], "has 16x14x11 voxels"),

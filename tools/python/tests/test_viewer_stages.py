@@ -58,6 +58,45 @@ def test_more_rays_come_after_a_sharp_picture(more: dict[str, Any]) -> None:
     assert told == sorted(told) and len(told) >= 2
 
 
+def test_a_picture_that_a_time_left_coarse_is_finished_at_rest() -> None:
+    """The coarse one stays until the whole one is there; passes go over it."""
+    clock = Clock()
+
+    def before_pass(drawn: Any) -> None:
+        clock.now += 1
+        eye.ack()
+
+    volume = FakeVolume(before_pass=before_pass, is_coarse=True)
+    scene = make_scene(volume, clock)
+    eye = Eye(scene)
+    eye.wish(time_budget=0.05)
+    while not volume.frames:
+        scene.step()
+    for _ in range(3):
+        scene.step()
+    assert len(volume.frames) == 1, "somebody who moves sends the next wish"
+    run(scene)
+    for _ in range(2):
+        eye.ack()
+        clock.now += 10
+        run(scene)
+    drawn = [(frame.request.time_budget, frame.size) for frame in volume.frames]
+    assert drawn[:2] == [(0.05, (64, 48)), (None, (64, 48))]
+    complete = [h["complete"] for h in eye.of_type("picture") if h["stage"] == "whole"]
+    assert complete == [False, True] and eye.pictures[-1] == (1, "lossless")
+    assert "pass" in [stage for _, stage in eye.pictures]
+    # The next wish has its time again; what is finished within it is drawn once.
+    eye.wish(time_budget=0.05)
+    while volume.frames[-1].request.time_budget is None:
+        scene.step()
+    volume.is_coarse = False
+    second = eye.wish(time_budget=0.05)
+    count = len(volume.frames)
+    run(scene)
+    assert len(volume.frames) == count + 1
+    assert [s for n, s in eye.pictures if n == second and s != "pass"] == ["whole"]
+
+
 def test_a_plain_picture_is_drawn_once() -> None:
     clock, volume = Clock(), FakeVolume()
     scene = make_scene(volume, clock)

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from isowave._camera import Camera
 from isowave._placed import Vector
 from isowave._request import Request
+from isowave._source_file import SourceFile
 
 SIDE = 64  # voxels along each axis, spacing 1
 VALUES = 255.0  # at the centre; 0 at the middle of a face
@@ -38,6 +39,7 @@ PLAIN_WISH: dict[str, Any] = {
     "max_error": None,
     "by": "proof",
     "time_budget": None,
+    "voxel_pixels": 0,
     "ambient": 0,
     "clip": [],
     "caps": True,
@@ -92,6 +94,8 @@ class FakeVolume:
     refuse       an error for a renderer with these options, or None
     on_host      the renderers are the host's, which have no limits
     suggested    what suggested_isovalues() returns, unless it is to fail
+    is_coarse    pictures within a time end before they are complete
+    source       the file that it came from
     """
 
     passes: int = 3
@@ -115,6 +119,8 @@ class FakeVolume:
     suggested: tuple[float, ...] = (90.5, 180.5)
     fail_suggesting: bool = False
     refuse_voxels: bool = False
+    is_coarse: bool = False
+    source: SourceFile | None = None
 
     def __getitem__(self, key: Any) -> NDArray[np.float32]:
         """Voxels: VALUES at the centre, less outwards."""
@@ -238,7 +244,8 @@ class FakeRenderer:
             alpha = np.where(np.isfinite(depth), 255, 0).astype(np.uint8)[:, :, None]
             if "depth" not in request.outputs:
                 return FakeImage(image, statistics, True, np.dstack((image, alpha)))
-        return FakeImage(image, statistics, True, np.dstack((image, alpha)), depth, bounds)
+        is_whole = not (self._volume.is_coarse and request.time_budget)
+        return FakeImage(image, statistics, is_whole, np.dstack((image, alpha)), depth, bounds)
 
     def _chosen(self, request: Request) -> dict[str, Any] | None:
         """Rays and levels for an error of the picture: FLIP is FLIP_OF_ONE by n x n rays, by n."""

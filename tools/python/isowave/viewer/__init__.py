@@ -80,7 +80,7 @@ def view(
         scene, fields = volume, scene_fields(volume)
         options["scene"] = json.dumps(fields)
         if field is None:
-            field = cast("VolumeLike", scene.volume if fields["field"] else scene.field)
+            field = cast("VolumeLike", scene.volume if fields["field"] == "volume" else scene.field)
         volume = cast("VolumeLike", scene.volume)
     options["field"] = field
     if notebook is None:

@@ -41,6 +41,30 @@ export function clipPlanes(clip, [begin, end]) {
   });
 }
 
+/**
+ * What clipPlanes() made of sliders, and the planes that it did not.
+ * @param {{normal: Vec, offset: number}[]} planes
+ * @param {[Vec, Vec]} box as in clipPlanes()
+ * @returns {{clip: number[], planes: {normal: Vec, offset: number}[]}}
+ */
+export function slidersOf(planes, box) {
+  const clip = [...WHOLE];
+  const others = planes.filter(({ normal, offset }) => {
+    const axis = normal.findIndex((part) => Math.abs(part) === 1);
+    if (axis < 0 || length(normal) !== 1) return true;
+    const i = 2 * axis + (normal[axis] < 0 ? 1 : 0);
+    const at = (normal[axis] * offset - box[0][axis]) / (box[1][axis] - box[0][axis]);
+    const offsetAt = (percent) =>
+      clipPlanes(WHOLE.map((whole, k) => (k === i ? percent : whole)), box)[0]?.offset;
+    const percent = Number((100 * at).toFixed(2)); // as handles have it
+    const moved = clip.map((before, k) => (k === i ? percent : before));
+    if (clip[i] !== WHOLE[i] || !isClip(moved) || offsetAt(percent) !== offset) return true;
+    clip[i] = percent;
+    return false;
+  });
+  return { clip: others.length === planes.length ? WHOLE : clip, planes: others };
+}
+
 /** @returns {boolean} whether it is a State's clip */
 function isClip(clip) {
   return clip.length === 6 && [0, 2, 4].every((i) =>

@@ -15,12 +15,14 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from isowave._annotate import NAMES, Annotations
+from isowave._color_map import ColorMap
 from isowave._compress import open as open_volume
 from isowave._core import read_scene
-from isowave._scene_file import annotations_of_scene, open_field
+from isowave._scene_file import annotations_of_scene, open_field, part_of_scene
 from isowave._series import Series, open_series
 
 from . import missing
+from .color_by import parse_color_by, parse_color_map
 from .protocol import MAX_RAYS, first_line
 
 
@@ -98,10 +100,18 @@ def make_parser() -> argparse.ArgumentParser:
     )
     add("--scene", metavar="FILE", help="scene file (JSON) that the page shows at first")
     add(
-        "--field",
-        metavar="FILE",
-        help="second volume, whose values or labels may colour the surface; volume: the same one, "
-        "for its caps [that of --scene]",
+        "--color-by",
+        type=_argument(parse_color_by),
+        metavar="BY",
+        help="what colours surfaces at first, as in `isowave render`: x, y, z, NX,NY,NZ, depth, "
+        "FILE, or volume, the same one, for its caps; then ,LOW,HIGH if wanted; or labels, or "
+        "FILE,labels",
+    )
+    add(
+        "--color-map",
+        type=_argument(parse_color_map),
+        metavar="NAME",
+        help="colours of --color-by [viridis; by labels, labels]",
     )
     add(
         "--annotate",
@@ -152,13 +162,17 @@ def scene_of(arguments: argparse.Namespace) -> dict[str, Any]:
         if not arguments.volume:
             raise ValueError("give a volume, or a scene that names one")
         return {}
-    if arguments.isovalue is not None:
-        raise ValueError("--scene has isovalues of its own: leave out --isovalue")
+    for name in ("isovalue", "color_by", "color_map"):
+        if getattr(arguments, name) is not None:
+            option = name.replace("_", "-")
+            raise ValueError(f"--{option}: --scene says what is drawn: leave out either")
     fields = read_scene(arguments.scene)
     if not arguments.volume and not fields["volume"]:
         raise ValueError(f"{arguments.scene} names no volume: give one")
-    if fields["color_by_field"] and not (fields["field"] or arguments.field):
-        raise ValueError(f"{arguments.scene} names no field: give --field")
+    if fields["color_by_field"] and not fields["field"]:
+        raise ValueError(
+            f'{arguments.scene}: its colours are by a field, and it names none: add "field", a file'
+        )
     return fields
 
 
@@ -173,10 +187,32 @@ def annotations_of(arguments: argparse.Namespace, fields: dict[str, Any]) -> Ann
 
 
 def field_of(arguments: argparse.Namespace, fields: dict[str, Any]) -> str:
-    """The field's file: that of --field, or of the scene if its colours need it; "": none."""
-    if arguments.field is not None:
-        return str(arguments.field)
+    """The field's file: that of --color-by, or of the scene if its colours need it; "": none."""
+    if arguments.color_by is not None:
+        return str(arguments.color_by.field)
     return str(fields["field"]) if fields.get("color_by_field") else ""
+
+
+def color_map_of(arguments: argparse.Namespace) -> ColorMap | None:
+    """The colours that pages have at first; None: those of the scene. Raises ValueError."""
+    if arguments.color_by is None:
+        if arguments.color_map is not None:
+            raise ValueError("--color-map: give --color-by, or leave it out")
+        return None
+    color_map: ColorMap = arguments.color_by.color_map
+    return replace(color_map, colors=arguments.color_map)
+
+
+def parts_of(
+    arguments: argparse.Namespace, fields: dict[str, Any], of_field: str
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Dataset and index of the volume and of the field. Raises ValueError."""
+    of_scene = {} if arguments.volume or not fields else part_of_scene(fields)
+    own = {"dataset": arguments.field_dataset, "index": arguments.field_index}
+    own = {name: each for name, each in own.items() if each is not None}
+    if own and of_field in ("", "volume"):
+        raise ValueError(f"--field-{next(iter(own))}: no file's values colour the surface")
+    return of_scene, {**(part_of_scene(fields, "field_") if fields else {}), **own}
 
 
 def series_of(names: Sequence[str], given: dict[str, Any]) -> Series | None:
@@ -229,7 +265,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         given = {
             "rate": arguments.rate,
             "tolerance": arguments.tolerance,
-            "relative_tolerance": arguments.tolerance_relative,
+            "tolerance_relative": arguments.tolerance_relative,
             "exact": arguments.exact or None,
             "levels": arguments.levels,
             "no_data": arguments.no_data,
@@ -240,17 +276,14 @@ def main(argv: Sequence[str] | None = None) -> int:
             "index": arguments.index,
         }
         fields = scene_of(arguments)
-        given = {key: value for key, value in given.items() if value is not None}
-        annotations = annotations_of(arguments, fields)
+        annotations, color_map = annotations_of(arguments, fields), color_map_of(arguments)
         names, of_field = arguments.volume or [fields["volume"]], field_of(arguments, fields)
+        of_scene, own = parts_of(arguments, fields, of_field)
+        given = of_scene | {key: value for key, value in given.items() if value is not None}
         series = series_of(names, given)
         if series is not None and of_field not in ("", "volume"):
             raise ValueError("a series has no second volume to colour by: name one of its steps")
         # The field comes first: if it cannot be opened, the volume need not be compressed.
-        own = {"dataset": arguments.field_dataset, "index": arguments.field_index}
-        own = {name: each for name, each in own.items() if each is not None}
-        if own and of_field in ("", "volume"):
-            raise ValueError(f"--field-{next(iter(own))}: give --field, or leave it out")
         field = None if of_field in ("", "volume") else open_field(of_field, given, **own)
         volume = open_volume(names[0], **given) if series is None else series
         server = serve(
@@ -260,6 +293,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             title=title_of(names),
             scene=json.dumps(fields) if arguments.scene else "",
             annotations=annotations,
+            color_map=color_map,
             isovalue=arguments.isovalue,
             device=arguments.device,
             memory_budget=arguments.memory_budget,

@@ -85,17 +85,19 @@ class Export {
   /** The command that draws the same picture. */
   get command() {
     const { view, state } = this;
-    const { samples, max_error: error, by, ambient } = wishedQuality(state);
+    const { samples, max_error: error, by, ambient, voxel_pixels: voxels } = wishedQuality(state);
     const scene = JSON.parse(writeScene(state, view.backgroundShown(), view.volume));
     if (this.isClear) {
       for (const key of ["background", "background_top"]) delete scene[key];
       scene.transparent = true;
     }
     const file = view.time.names[view.time.step] ?? (view.volume.title || "FILE");
+    const volume = scene.volume ? "" : ` ${shellWord(file)}`;
     const options = [
       "--size", this.size.join("x"),
       ...(samples > 1 && !choosesRays(state) ? ["--samples", samples] : []),
       ...(ambient ? ["--ambient", ambient] : []),
+      ...(voxels ? ["--voxel-pixels", voxels] : []),
       ...(error && by === "picture" ? ["--max-image-error", error] : []),
       ...(error && by !== "picture" ? ["--max-surface-error", error] : []),
       ...(error && by === "sample" ? ["--by", "sample"] : []),
@@ -103,7 +105,7 @@ class Export {
     ];
     const name = shellWord(this.name.replace(/png$/, "json"));
     return `cat > ${name} << 'END'\n${JSON.stringify(scene)}\nEND\n`
-      + `isowave render ${shellWord(file)} --scene ${name} ${options.join(" ")}\n`;
+      + `isowave render${volume} --scene ${name} ${options.join(" ")}\n`;
   }
 
   /** Size and command, as they are now. */

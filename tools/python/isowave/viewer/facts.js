@@ -24,7 +24,8 @@ function factsOf(head, state) {
 
 /** The error of a picture that keeps it, in words. detail: as in head; null: full detail. */
 function errorOf(detail, state) {
-  const { max_error: error, by } = wishedQuality(state);
+  const { max_error: error, by, voxel_pixels: voxels } = wishedQuality(state);
+  if (voxels) return `voxels up to ${toText(voxels)} px apart`;
   if (by !== "picture") {
     const share = by === "sample" ? "99 % of the hits" : "most pixels";
     return error ? `${share} within ${toText(error)} px` : "at full detail";

@@ -3,7 +3,7 @@
 // (front_end.py).
 
 /** @typedef {{colors: string, by: "axis" | "depth" | "field" | "caps" | "labels",
- *    axis: Vec, range: ?[number, number]}} ColorMap as in wishes; depth: along the view */
+ *    axis: Vec, range: ?[number, number]}} ColorMap as in wishes */
 /** @typedef {{rays: number, angle: number}} Shadow as in wishes: rays of a hit towards the light,
  *    and half of the angle that the light has [degrees] */
 
@@ -13,6 +13,7 @@ const AXES = { x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1] };
 const BY_FIELD = { field: "field", caps: "caps", labels: "labels" }; // ways, as the page names them
 const isWay = (by) => by === "depth" || Object.hasOwn(BY_FIELD, by);
 const LIGHTS = ["ambient", "diffuse", "specular", "above"]; // as the library has them
+const WEIGHTS = [0.15, 0.5, 0.2, 0.45]; // of these, by default
 const MAX_PLANES = 8; // beside those of the sliders
 const SHADOWS = { 1: "hard", 16: "soft" }; // rays of a hit that one can choose
 const BOUNCE = 16; // rays of a hit that bring light
@@ -92,17 +93,13 @@ export function lightOf({ eye, at, up }) {
  */
 const hasLabelColors = (state, field) => drawsLabels(state) || Boolean(field?.labels);
 
-/** A map by the depth, as it is now, along an axis. */
-const alongView = (map, camera) => (map?.by !== "depth" ? map
-  : { ...map, by: "axis", axis: camera ? unit(sub(camera.at, camera.eye)) : AXES.z });
-
 /** What a wish says of colours, lights and the background's upper edge. field: as in welcome */
 export function lookOf(state, field) {
   const { color_map: map, lights, light, shadow, bounce, background_top: top } = state;
   const isDrawn = map?.by === "labels" ? hasLabelColors(state, field)
     : !(drawsLabels(state) && isByField(map));
   return { background_top: top && toRgb(top), lights, light,
-    color_map: isDrawn ? alongView(map, state.camera) : null,
+    color_map: isDrawn ? map : null,
     shadow: hasOpaque(state) && light ? shadow : null,
     bounce: hasOpaque(state) && light ? bounce : 0 };
 }

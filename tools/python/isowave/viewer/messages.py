@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping
 from dataclasses import replace
@@ -12,12 +13,14 @@ from numpy.typing import NDArray
 
 from isowave._annotate import NAMES, Annotations
 from isowave._checked import refuse
+from isowave._color_map import ColorMap, color_map_of
 from isowave._core import Error, parse_scene
 
 from .interfaces import ImageLike, VolumeLike
 from .pictures import Extent
 from .protocol import MAX_TITLE, MAX_UNITS, VERSION, checked_text, first_line
 from .renderers import Renderers, may_have_labels
+from .steps import Steps, source_of
 from .turns import Frame, Stage
 
 #: What a probe says of a place where nothing is seen.
@@ -28,16 +31,10 @@ def welcome(
     volume: VolumeLike,
     title: str,
     value_range: tuple[float, float],
-    isovalue: float | None,
-    scene: dict[str, Any] | None,
-    annotations: dict[str, Any] | None,
     field: dict[str, Any] | None,
-    steps: list[str] | None,
+    steps: Steps,
 ) -> dict[str, Any]:
-    """Facts about the volume. isovalue, annotations: the first ones.
-
-    scene: fields of the first one. steps: names of a series' steps, whose first one is the volume.
-    """
+    """Facts about the volume, which is the first step."""
     return {
         "type": "welcome",
         "version": VERSION,
@@ -50,11 +47,21 @@ def welcome(
         "range": list(value_range),
         "bits_per_voxel": float(volume.bits_per_voxel),
         "max_error": finite(volume.max_error),
-        "isovalue": isovalue,
-        "scene": scene,
-        "annotations": annotations,
+        "levels": int(volume.num_levels),
         "field": field,
-        "steps": steps,
+        "steps": steps.names,
+        "sources": steps.sources,
+    }
+
+
+def first_shown(
+    scene: str, annotations: Annotations | None, color_map: ColorMap | None
+) -> dict[str, Any]:
+    """What pages show at first, beside the isovalue. Raises TypeError, ValueError."""
+    return {
+        "scene": json.loads(scene) if scene else None,
+        "annotations": first_annotations(annotations),
+        "color_map": first_color_map(color_map),
     }
 
 
@@ -71,10 +78,23 @@ def first_annotations(wanted: Annotations | None) -> dict[str, Any] | None:
     }
 
 
+def first_color_map(wanted: ColorMap | None) -> dict[str, Any] | None:
+    """As wishes have them. Raises TypeError, ValueError."""
+    color_map = color_map_of(wanted)
+    if color_map is None:
+        return None
+    if color_map.table:
+        raise ValueError("color_map: pages show no tables of colours: give a name")
+    limits = None if color_map.range is None else [*color_map.range]
+    axis = [*color_map.axis]
+    return {"colors": color_map.name, "by": color_map.by, "axis": axis, "range": limits}
+
+
 def field(volume: VolumeLike, name: str) -> dict[str, Any]:
     """Facts about the second volume. name: of its file; "volume": it is the drawn one."""
     values = [finite(value) for value in volume.value_range]
-    return {"name": name, "range": values, "labels": may_have_labels(volume)}
+    labels, source = may_have_labels(volume), source_of(volume)
+    return {"name": name, "range": values, "labels": labels, "source": source}
 
 
 def scene(text: str) -> dict[str, Any]:

@@ -9,11 +9,12 @@ looks nowhere.
     {"type": "wish", "id": 7, "isovalue": 80, "size": [1280, 720], "camera": {...} | null,
      "color": [r, g, b], "background": [r, g, b], "background_top": [r, g, b] | null,
      "samples": 1, "max_error": 0.5 | null,
-     "by": "proof" | "sample" | "picture", "time_budget": 100 | null, "ambient": 0,
+     "by": "proof" | "sample" | "picture", "time_budget": 100 | null, "voxel_pixels": 0,
+     "ambient": 0,
      "clip": [{"normal": [1, 0, 0], "offset": 20}], "caps": true,
      "surfaces": [{"isovalue": 80, "color": [r, g, b], "opacity": 0.5}], or
                  [{"labels": [3, 7], "color": [r, g, b], "opacity": 0.5}],
-     "color_map": {"colors": "viridis", "by": "axis" | "field" | "caps" | "labels",
+     "color_map": {"colors": "viridis", "by": "axis" | "depth" | "field" | "caps" | "labels",
                    "axis": [0, 0, 1], "range": [low, high] | null} | null,
      "slices": [{"normal": [0, 0, 1], "offset": 9, "opacity": 1, "clipped": true}],
      "slice_map": {"colors": "gray", "range": [low, high] | null}, "step": 0,
@@ -29,7 +30,8 @@ looks nowhere.
     {"type": "page", "text": "a scene file's"}
 
 max_error is in pixels of the surface, by proof or by sample; or, by picture, FLIP of the picture,
-and then samples are the most rays of a pixel that may be chosen.
+and then samples are the most rays of a pixel that may be chosen. voxel_pixels is that of a Request,
+and comes without max_error and labels.
 
 Without surfaces, one opaque surface is drawn, of the wish's isovalue and color. Surfaces come in
 place of these. Surfaces and slices come without time_budget and max_error by picture, labels
@@ -57,13 +59,13 @@ from typing import Any, Final
 from isowave._annotate import NAMES, Annotations
 from isowave._camera import Camera
 from isowave._clip import ClipPlane
-from isowave._color_map import BY, ColorMap
+from isowave._color_map import BY, BY_FIELD, ColorMap
 from isowave._core import color_map_names
 from isowave._request import LIGHTS, Request
 from isowave._slice import Slice
 from isowave._surface import MAX_LABEL, MAX_SURFACES, Surface
 
-VERSION: Final = 12
+VERSION: Final = 13
 MAX_MESSAGE_BYTES: Final = 8192
 MAX_SIDE: Final = 8192  # pixels of a picture along each axis
 MAX_SAMPLES: Final = 8  # rays of a pixel along each axis, as the library has it
@@ -77,6 +79,7 @@ MAX_LIGHT: Final = 10  # weight of a light
 MAX_UNITS: Final = 16  # letters of an annotation's units
 MAX_TITLE: Final = 80  # letters of an annotation's title
 MAX_TIME_BUDGET: Final = 10_000  # ms
+MAX_VOXEL_PIXELS: Final = 1000
 MAX_FLOAT32: Final = 3.4028234663852886e38
 MAX_LENGTH: Final = 1e18  # of a camera's coordinates [world units]
 MAX_RAYS: Final = 150_000_000  # of a client's picture, with those of its hits
@@ -444,6 +447,13 @@ def _error(content: dict[str, Any]) -> dict[str, Any]:
     return {"max_error": _number(value, 1e-3, 1e3, "max_error"), "by": by}
 
 
+def _voxel_pixels(content: dict[str, Any], surfaces: tuple[Surface, ...]) -> float:
+    pixels = _number(content["voxel_pixels"], 0, MAX_VOXEL_PIXELS, "voxel_pixels")
+    if pixels and (content["max_error"] is not None or (surfaces and surfaces[0].labels)):
+        raise ProtocolError("voxel_pixels comes without max_error and labels")
+    return pixels
+
+
 def _annotations(value: object) -> Annotations | None:
     if value is None:
         return None
@@ -487,7 +497,7 @@ def _read_wish(content: dict[str, Any]) -> Wish:
     time_budget = _optional(content["time_budget"], 1, MAX_TIME_BUDGET, "time_budget")
     surfaces, color = _surfaces(content), _triple(content["color"], 0, 1, "color")
     color_map = _color_map(content["color_map"])
-    by_field = color_map is not None and color_map.by != "axis"
+    by_field = color_map is not None and color_map.by in BY_FIELD
     is_value = by_field and color_map is not None and color_map.by != "labels"
     if is_value and surfaces and surfaces[0].labels:
         raise ProtocolError("labels are drawn without colours by the field")
@@ -513,6 +523,7 @@ def _read_wish(content: dict[str, Any]) -> Wish:
         outputs=("rgb",),
         **_error(content),
         time_budget=None if time_budget is None else time_budget / 1000,
+        voxel_pixels=_voxel_pixels(content, surfaces),
         ambient=_integer(content["ambient"], 0, MAX_AMBIENT, "ambient"),
         progress=False,
     )
@@ -553,7 +564,7 @@ _READERS: Final[dict[str, tuple[dict[str, None], Callable[[dict[str, Any]], Mess
     "wish": (
         dict.fromkeys(
             "type id isovalue size camera color background background_top samples max_error by"
-            " time_budget ambient clip caps surfaces color_map slices slice_map"
+            " time_budget voxel_pixels ambient clip caps surfaces color_map slices slice_map"
             " lights light shadow bounce step annotations transparent".split()
         ),
         _read_wish,

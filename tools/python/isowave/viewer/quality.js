@@ -33,7 +33,14 @@ const QUALITY_ROWS = `
       <select name="ambient"><option value="0">none</option>${
   AMBIENT.map((n) => `<option value="${n}">${n} rays</option>`).join("")
 }</select></label>
-    <label title="The best picture within this time">Time per picture
+    <label title="Coarser levels of detail are drawn where their voxels lie no further apart on the
+screen: that is faster">Voxels up to
+      <span class="unit"><input name="voxel_pixels" type="number" min="0.01" max="1000" step="any"
+      placeholder="all"> px</span></label>
+    <p class="hint of_levels" hidden>This volume has one level of detail. Start with
+      <code>isowave view --levels all FILE</code> for coarser ones.</p>
+    <label title="The best picture within this time while you move; it is finished at rest">Time
+      per picture
       <span class="unit"><input name="time_budget" type="number"
       min="1" max="10000" step="any"
       placeholder="none"> ms</span></label>`;
@@ -55,18 +62,22 @@ export function wishedQuality(state) {
     by,
     max_error: keepsError(state) ? state.max_error : null,
     time_budget: plain && !isByField(state.color_map) ? state.time_budget : null,
+    voxel_pixels: drawsLabels(state) || (keepsError(state) && state.max_error !== null) ? 0
+      : state.voxel_pixels ?? 0,
     ambient: hasOpaque(state) ? ambient : 0,
   };
 }
 
 /** Parts of a URL's hash; what is not set is left out. */
-function writeQuality({ samples, max_error: error, by, time_budget: time, ambient }) {
+function writeQuality({ samples, max_error: error, by, time_budget: time, voxel_pixels: voxels,
+  ambient }) {
   const short = (v) => String(Number(v.toPrecision(9)));
   return {
     ...(samples > 1 && { samples }),
     ...(error && { error: short(error) }),
     ...(error && by !== "proof" && { by }),
     ...(time && { ms: short(time) }),
+    ...(voxels && { voxels: short(voxels) }),
     ...(ambient && { ambient }),
   };
 }
@@ -86,6 +97,7 @@ function readQuality(parts, number, before) {
     ...judgedBy(by, before),
     max_error: number("error", ...ERRORS[by].limits) ?? judgedBy(by, before).max_error,
     time_budget: parts.has("error") ? undefined : number("ms", 1, 10000),
+    voxel_pixels: parts.has("error") ? undefined : number("voxels", 0.01, 1000),
     ambient: [0, ...AMBIENT].find((n) => n === number("ambient", 0, 255)),
   };
 }
@@ -100,6 +112,7 @@ class QualityRows {
   /** @param {View} view whose state they show and change */
   constructor(view) {
     this.view = view;
+    this.hasLevels = false;
   }
 
   listen(on) {
@@ -112,6 +125,7 @@ class QualityRows {
     });
     number("max_error", null);
     number("time_budget", null);
+    number("voxel_pixels", null);
     number("samples");
     number("ambient");
     on(view.field("by"), "change", ({ target }) => {
@@ -119,6 +133,13 @@ class QualityRows {
       if (changes.max_error === null) view.field("max_error").value = ""; // with the focus, too
       view.change(changes);
     });
+  }
+
+  /** A volume has come. Without coarser levels of detail, none is drawn. */
+  welcome({ levels }) {
+    this.hasLevels = levels > 1;
+    if (!this.hasLevels) this.view.state.voxel_pixels = null;
+    this.view.find(".of_levels").hidden = this.hasLevels;
   }
 
   show(state) {
@@ -134,12 +155,14 @@ class QualityRows {
     Object.assign(view.field("max_error"), { min, max });
     view.set("max_error", state.max_error ?? "");
     view.set("time_budget", state.time_budget ?? "");
+    view.set("voxel_pixels", state.voxel_pixels ?? "");
     view.find(".of_error").textContent = unit;
     view.find(".of_picture").hidden = !(plain && state.by === "picture");
     view.find(".of_samples").textContent = `${chooses ? "Most rays" : "Rays"} per pixel`;
     view.field("max_error").disabled = !keepsError(state);
     view.field("by").disabled = drawsLabels(state);
     view.field("time_budget").disabled = !plain || isByField(state.color_map);
+    view.field("voxel_pixels").disabled = !this.hasLevels || drawsLabels(state);
     view.field("ambient").disabled = !hasOpaque(state);
   }
 }

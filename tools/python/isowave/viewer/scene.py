@@ -9,14 +9,14 @@
 The newest wish of a client counts; it cancels the frame of the one before. A wish is drawn in
 stages: a first picture of a quarter of the width and height; if it asks for more than a ray a
 pixel, a sharp picture of one; the whole picture (sent as JPEG, after passes over the first one);
-once the client rests, the lossless picture (PNG), and what is certain of it. Clients take turns; a
-long picture gives way to smaller ones between two passes. At most two pictures are on the way to a
-client; of those that wait for it only the last is kept, and it is always sent.
+once the client rests, the lossless picture (PNG), and what is certain of it. A picture that a time
+has left coarse is drawn to its end before. Clients take turns; a long picture gives way to smaller
+ones between two passes. At most two pictures are on the way to a client; of those that wait for it
+only the last is kept, and it is always sent.
 """
 
 from __future__ import annotations
 
-import json
 import math
 import threading
 import time
@@ -30,14 +30,15 @@ from numpy.typing import NDArray
 from isowave._annotate import Annotations
 from isowave._camera import Camera
 from isowave._checked import Isovalue
+from isowave._color_map import ColorMap
 
 from . import messages
 from .interfaces import ImageLike, ProgressLike, RendererLike, SeriesLike, VolumeLike
 from .hits import Hits, seen
 from .jpeg import encode_jpeg
 from .page_files import page_maker
-from .pictures import Extent, Stopped, annotate, chosen_voxel_pixels, encode_png
-from .pictures import laid_over, opaque, picture_of, share_within
+from .pictures import Extent, Stopped, annotate, chosen_voxel_pixels, encode_png, laid_over
+from .pictures import opaque, picture_of, share_within
 from .protocol import MAX_FLOAT32, MAX_RAYS, Ack, Budget, Message, Probe, ProtocolError
 from .protocol import PageFile, SceneFile, Wish
 from .renderers import MakeHost, RendererOptions, Renderers, make_host
@@ -64,9 +65,10 @@ class Scene:
     isovalue       at first; None, "auto": the first of Volume.suggested_isovalues()
     scene          what pages show at first: JSON of scene_fields(); "": the surface of `isovalue`
     annotations    what pages draw over pictures at first; None: those of `scene`
+    color_map      what colours surfaces at first; None: that of `scene`
     field          a second volume, for colours by its values or labels; it may be the volume
                    itself, or the series itself, and else comes with no series
-    field_name     of the field's file, for scenes that pages save
+    field_name     of the field's file, for scenes that pages save if the field has no source
     device         as in isowave.Renderer
     memory_budget  as in isowave.Renderer
     size, samples  the largest picture that the renderer is made for at first; it is made anew when
@@ -90,6 +92,7 @@ class Scene:
         title: str = "",
         scene: str = "",
         annotations: Annotations | None = None,
+        color_map: ColorMap | None = None,
         field: VolumeLike | SeriesLike | None = None,
         field_name: str = "",
         device: str | None = None,
@@ -115,8 +118,7 @@ class Scene:
         if isinstance(field, SeriesLike) and not shows_volume:
             raise ValueError("the field is a series: give one of its volumes")
         self._isovalue, self._title = isovalue, title
-        self._first_scene = json.loads(scene) if scene else None
-        self._first_annotations = messages.first_annotations(annotations)
+        self._first_shown = messages.first_shown(scene, annotations, color_map)
         self._max_clients, self._clock = max_clients, clock
         self._changed = threading.Condition()
         self._has_threads, self._threads = start, list[threading.Thread]()
@@ -357,10 +359,13 @@ class Scene:
         request = replace(
             extent.request(wish.request, camera),
             outputs=("rgb",) if stage is Stage.FIRST else ("rgb", "depth"),
+            time_budget=None if client.to_the_end else wish.request.time_budget,
             on_pass=lambda so_far: self._on_pass(frame, so_far),
         )
         if frame.by_host:  # full detail until the device draws, not interrupted by a time
             request = replace(request, max_error=None, by="proof", time_budget=None)
+        if frame.by_host or self._steps.volume.num_levels == 1:
+            request = replace(request, voxel_pixels=0.0)
         image = renderer.draw(request)
         if frame.stopped:
             self._show_what_there_is(frame, image)
@@ -370,8 +375,7 @@ class Scene:
         drawn = picture_of(image, request)
         rgb = self._annotated(frame, drawn)
         data = encode_jpeg(opaque(rgb))
-        seconds = self._clock() - frame.began
-        volume = self._steps.volume
+        seconds, volume = self._clock() - frame.began, self._steps.volume
         head = messages.finished_picture(frame, seconds, image, volume, self._renderers)
         with self._changed:
             if self._is_stale(frame):
@@ -388,6 +392,9 @@ class Scene:
             elif stage is Stage.SHARP:
                 client.stage, client.due = Stage.WHOLE, now + REST_SECONDS
                 client.under, client.whole_seconds = None, now - frame.began
+            elif request.time_budget is not None and not image.complete:
+                client.stage, client.due = Stage.WHOLE, now + REST_SECONDS
+                client.under, client.to_the_end = drawn, True
             else:
                 client.stage, client.due = Stage.LOSSLESS, now + REST_SECONDS
                 client.under, client.lossless = None, (head, rgb)
@@ -445,9 +452,8 @@ class Scene:
                 frame.last_told = now
                 frame.client.post(messages.progress(frame), None)
         if worth_it:
-            drawn = so_far.rgb
-            if under is not None:
-                drawn = laid_over(under, drawn, frame.wish.request)
+            rgb = so_far.rgb
+            drawn = rgb if under is None else laid_over(under, rgb, frame.wish.request)
             data = encode_jpeg(self._annotated(frame, drawn))
             frame.last_sent = self._clock()
             frame.sending_took = frame.last_sent - now
@@ -471,8 +477,8 @@ class Scene:
         client = frame.client
         if frame.stage is not Stage.FIRST or self._clock() - client.shown < SHOW_SECONDS:
             return
-        drawn = opaque(picture_of(image, frame.wish.request))
-        data = encode_jpeg(self._annotated(frame, drawn))
+        picture = self._annotated(frame, opaque(picture_of(image, frame.wish.request)))
+        data = encode_jpeg(picture)
         with self._changed:
             if client.joined:
                 self._offer_pass(frame, data)
@@ -515,11 +521,12 @@ class Scene:
             return
         pixels = extent.size[1] / wish.size[1]  # of the first picture, to one of the whole picture
         max_error = wish.request.max_error
+        voxel_pixels = client.voxel_pixels or wish.request.voxel_pixels
         request = replace(
             extent.request(wish.request, client.camera),
             outputs=("depth", "bounds"),
             max_error=None if max_error is None else max_error * pixels,
-            voxel_pixels=client.voxel_pixels * pixels,
+            voxel_pixels=voxel_pixels * pixels if self._steps.volume.num_levels > 1 else 0.0,
             time_budget=None,
             color_map=None,
             on_pass=lambda so_far: client.wish is wish and not self._closing,
@@ -538,8 +545,7 @@ class Scene:
 
     def _prepare(self) -> None:
         low, high = (float(v) for v in self._first.value_range)
-        known = math.isfinite(low) and math.isfinite(high)
-        if known:
+        if math.isfinite(low) and math.isfinite(high):
             self._range = low, high
         else:
             self._make_histogram()
@@ -547,8 +553,8 @@ class Scene:
             self._isovalue = self._first_isovalue()
         shown = self._first if self._shows_volume else self._field
         field = None if shown is None else messages.field(shown, self._field_name)
-        first = self._range, self._isovalue, self._first_scene, self._first_annotations
-        self._facts = messages.welcome(self._first, self._title, *first, field, self._steps.names)
+        facts = messages.welcome(self._first, self._title, self._range, field, self._steps)
+        self._facts = {**facts, "isovalue": self._isovalue, **self._first_shown}
         with self._changed:
             self._prepared = True
             for client in list(self._turns.clients):

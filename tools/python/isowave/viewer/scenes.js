@@ -5,19 +5,34 @@ const MAX_MESSAGE_BYTES = 8192; // as the server has it
 const toHex = (rgb) => `#${rgb.map((part) =>
   Math.round(255 * clamp(part, 0, 1)).toString(16).padStart(2, "0")).join("")}`;
 
+/** @typedef {{path: string, dataset: string, index: string}} Source of a volume, as in welcome */
+
+/** Fields of a scene that say where a volume came from. prefix: volume or field */
+function partsOf(name, source) {
+  if (!source?.path) return {};
+  const prefix = name === "volume" ? "" : "field_";
+  return { [name]: source.path, ...(source.dataset && { [`${prefix}dataset`]: source.dataset }),
+    ...(source.index && { [`${prefix}index`]: source.index }) };
+}
+
 /**
  * The scene file of what a view shows.
  * @param {State} state
  * @param {string} background "#rrggbb", as it is shown
- * @param {{box: [Vec, Vec], field: ?{name: string, labels: boolean}}} volume as in welcome
+ * @param {{box: [Vec, Vec], field: ?{name: string, labels: boolean, source: ?Source},
+ *    sources: ?Source[]}} volume as in welcome
  * @returns {string} JSON, as isowave/scene.hpp describes it
  */
-export function writeScene(state, background, { box, field }) {
+export function writeScene(state, background, { box, field, sources }) {
   const { camera, caps } = state;
   const { color_map: map, lights, light, shadow, bounce } = lookOf(state, field);
-  const name = map?.by === "labels" && !field?.labels ? "volume" : field?.name;
+  const isOwn = map?.by === "labels" && !field?.labels; // those that are drawn
+  const ofField = isOwn || field?.name === "volume" ? { path: "volume" }
+    : field?.source ?? { path: field?.name };
   return JSON.stringify({
     isowave_scene: 1,
+    ...partsOf("volume", sources?.[sources.length > 1 ? state.step : 0]),
+    ...(isByField(map) && partsOf("field", ofField)),
     ...(camera && { camera: { eye: camera.eye, at: camera.at, up: camera.up,
       fovy_degrees: camera.fovy_deg } }),
     surfaces: drawnSurfaces(state).map(({ labels, isovalue, color, opacity }) =>
@@ -28,8 +43,9 @@ export function writeScene(state, background, { box, field }) {
     background,
     ...(state.background_top && { background_top: state.background_top }),
     ...(map && { color_map: map.colors, color_axis: map.axis }),
-    ...(map && map.by !== "axis" && { color_by_field: true, color_caps_alone: map.by === "caps",
-      ...(map.by === "labels" && { color_by_label: true }), ...(name && { field: name }) }),
+    ...(map?.by === "depth" && { color_by_depth: true }),
+    ...(isByField(map) && { color_by_field: true, color_caps_alone: map.by === "caps",
+      ...(map.by === "labels" && { color_by_label: true }) }),
     ...(map?.range && { color_low: map.range[0], color_high: map.range[1] }),
     ...lights,
     ...(light && { light_direction: light }),
@@ -45,15 +61,16 @@ export function writeScene(state, background, { box, field }) {
  *    null or not there have their defaults
  * @param {?{labels: boolean}} field the server's second volume, which comes in place of theirs
  * @param {boolean} hasLabels whether the volume may have labels
+ * @param {?[Vec, Vec]} box corners of the volume's box: planes of the sliders go back to them
  * @returns {Partial<State>}
  * @throws {Error} that says what this page cannot show
  */
-export function readScene(fields, field, hasLabels) {
+export function readScene(fields, field, hasLabels, box = null) {
   const { camera, color_map: colors, color_axis: axis = AXES.z, color_low: low } = fields;
   const ofLabels = fields.surfaces.filter(({ labels }) => labels?.length);
   const isOwn = fields.color_by_label && ["volume", "", null, undefined].includes(fields.field);
   if (fields.color_by_field && !field && !(isOwn && ofLabels.length)) {
-    throw new Error("This page has no second volume to colour by: isowave view --field FILE.");
+    throw new Error("This page has no second volume to colour by: isowave view --color-by FILE.");
   }
   if (fields.color_by_label && !field?.labels && !(isOwn && ofLabels.length)) {
     throw new Error("The second volume has no labels to colour by.");
@@ -71,7 +88,8 @@ export function readScene(fields, field, hasLabels) {
   if (fields.clip.some(({ normal, offset }) => !(Math.abs(offset) / length(normal) <= 1e18))) {
     throw new Error("This page shows clipping planes up to 1e18 from the origin.");
   }
-  if (fields.clip.length > MAX_PLANES) {
+  const { clip, planes } = box ? slidersOf(fields.clip, box) : { clip: WHOLE, planes: fields.clip };
+  if (planes.length > MAX_PLANES) {
     throw new Error(`This page shows up to ${MAX_PLANES} clipping planes of a scene.`);
   }
   const view = camera && { up: [0, 1, 0], fovy_deg: 60, ...camera };
@@ -88,8 +106,8 @@ export function readScene(fields, field, hasLabels) {
     ...(!ofLabels.length && { selected: 0,
       surfaces: fields.surfaces.map(({ isovalue, color, opacity }) => makeSurface(
         isovalue, toHex(color), Math.max(opacity, LEAST_OPACITY))) }),
-    clip: WHOLE,
-    planes: fields.clip.map(({ normal, offset }) => (
+    clip,
+    planes: planes.map(({ normal, offset }) => (
       { normal: unit(normal), offset: offset / length(normal) })),
     caps: fields.caps ?? true,
     ...readSceneSlices(fields),
@@ -97,8 +115,8 @@ export function readScene(fields, field, hasLabels) {
     background: fields.background ? toHex(fields.background) : null,
     background_top: fields.background_top ? toHex(fields.background_top) : null,
     color_map: colors ? { colors, axis: unit(axis),
-      by: !fields.color_by_field ? "axis" : fields.color_by_label ? "labels"
-        : fields.color_caps_alone ? "caps" : "field",
+      by: !fields.color_by_field ? (fields.color_by_depth ? "depth" : "axis")
+        : fields.color_by_label ? "labels" : fields.color_caps_alone ? "caps" : "field",
       range: typeof low === "number" ? [low, fields.color_high] : null } : null,
     light: fields.light_direction ? unit(fields.light_direction) : null,
     shadow: fields.light_direction && fields.shadow_rays > 0
@@ -106,6 +124,7 @@ export function readScene(fields, field, hasLabels) {
         angle: clamp(fields.light_angle ?? LIGHT_ANGLE, 0.01, 45) } : null,
     bounce: Math.min(fields.bounce_rays ?? 0, 255),
     lights: LIGHTS.every((name) => typeof fields[name] === "number")
+      && LIGHTS.some((name, i) => fields[name] !== Math.fround(WEIGHTS[i]))
       ? Object.fromEntries(LIGHTS.map((name) => [name, clamp(fields[name], 0, 10)])) : null,
   };
 }
@@ -224,7 +243,7 @@ class SceneFiles {
   use(fields) {
     try {
       const { volume, labels } = this.view;
-      this.view.change(readScene(fields, volume?.field, labels.isUseful));
+      this.view.change(readScene(fields, volume?.field, labels.isUseful, volume?.box));
       if (this.sent) this.keep(this.sent.name, this.sent.text);
       this.sent = null;
     } catch (error) {

@@ -5,10 +5,11 @@
 /** @typedef {{eye: Vec, at: Vec, up: Vec, fovy_deg: number}} Camera world space */
 /** @typedef {{surfaces: Surface[], selected: number, camera: ?Camera,
  *    background: ?string, background_top: ?string, samples: number, max_error: ?number, by: string,
- *    time_budget: ?number, ambient: number, clip: number[], caps: boolean, color_map: ?ColorMap,
- *    planes: {normal: Vec, offset: number}[], lights: ?Record<string, number>, light: ?Vec,
- *    shadow: ?Shadow, bounce: number, slices: Slice[], slice_map: SliceMap, labels: Group[],
- *    step: number, annotations: Annotations}} State
+ *    time_budget: ?number, voxel_pixels: ?number, ambient: number, clip: number[], caps: boolean,
+ *    color_map: ?ColorMap, planes: {normal: Vec, offset: number}[],
+ *    lights: ?Record<string, number>, light: ?Vec, shadow: ?Shadow, bounce: number,
+ *    slices: Slice[], slice_map: SliceMap, labels: Group[], step: number,
+ *    annotations: Annotations}} State
  *    what the URL keeps, but for the surface that is selected. clip: from and to along x, y and z
  *    [% of the volume's box]. planes: further clipping planes, of a scene file. step: of a
  *    series, from 0. bounce: rays of a hit that bring light. background_top: colour at the upper

@@ -5,12 +5,24 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 from typing import Final
+
+from isowave._source_file import SourceFile
 
 from .interfaces import SeriesLike, VolumeLike
 
 STEP_SECONDS: Final = 1.0  # with a step, at most, while other clients wait for another one
+
+
+def source_of(volume: object) -> dict[str, str] | None:
+    """The file that a volume was opened from, as messages have it."""
+    return plain_source(getattr(volume, "source", None))
+
+
+def plain_source(source: SourceFile | None) -> dict[str, str] | None:
+    return asdict(source) if isinstance(source, SourceFile) else None
 
 
 class Steps:
@@ -37,6 +49,10 @@ class Steps:
                 raise ValueError("the series has no steps: give one with a step or more")
             self._series = source
             self.names = [Path(name).name for name in source.names]
+        self.sources = [source_of(source)]  #: of each step
+        if self._series is not None:
+            find = getattr(source, "source", lambda step: None)
+            self.sources = [plain_source(find(step)) for step in range(len(self._series))]
         first: VolumeLike = source[0] if isinstance(source, SeriesLike) else source
         self._volumes = {0: first}
         self._errors: dict[int, Exception] = {}  # of steps that could not be read

@@ -61,6 +61,7 @@ class Client:
     gave_way: int = 0  # how often the wish's whole picture was interrupted for another client
     due: float = -math.inf  # when the stage may begin
     ranges: tuple[Any, Any] = (None, None)  # of the wish's colours, once they are known
+    to_the_end: bool = False  # the wish's picture within its time was coarse: it is drawn without
     voxel_pixels: float = 0.0  # chosen for the wish's whole picture, to keep the picture's error
     under: NDArray[np.uint8] | None = None  # what the wish shows where a pass has no hits yet
     hits: Hits | None = None  # of the last picture with all pixels
@@ -94,7 +95,7 @@ class Client:
         self.stage = after_first(wish) if skip_first else Stage.FIRST
         self.gave_way, self.lossless, self.due = 0, None, -math.inf
         self.under = self.hits = None
-        self.ranges, self.voxel_pixels = (None, None), 0.0
+        self.ranges, self.voxel_pixels, self.to_the_end = (None, None), 0.0, False
 
     def leave(self) -> None:
         self.joined = False

@@ -8,9 +8,12 @@
 //              anatomical: whether that is a patient's, LPS; dtype, range [low, high],
 //              bits_per_voxel, max_error of voxels, isovalue, scene: fields of the scene to show at
 //              first, or null; annotations: those to show at first, as in wishes, or null: the
-//              scene's; field: name, range of the second volume ("volume": the same one), and
-//              labels: whether it may have some; or null; steps: names of a series' steps, or null.
-//              The facts are those of its first step, and all steps have one box
+//              scene's; color_map: as in wishes, what colours surfaces at first, or null; levels
+//              of detail; field: name, range of the second volume ("volume": the same one), and
+//              labels: whether it may have some; or null; steps: names of a series' steps, or null;
+//              sources: of each step, or of the volume, path, dataset and index of its file, or
+//              null; the field's source, too. The facts are those of the first step, and all steps
+//              have one box
 //   status     state: starting, ready, failed; device ("host": none), notice (what it computes
 //              otherwise than the host, or ""), device_memory (null on the host), memory_bytes,
 //              memory_budget, nbytes of the compressed volume
@@ -46,7 +49,7 @@
  *    the view's; beside: another connection to the scene; open: opens a volume that was dropped
  */
 
-const VERSION = 12;
+const VERSION = 13;
 const MIN_WAIT_MS = 15; // between two wishes
 const MAX_IN_WAIT_MS = 120; // for a picture of the last wish, before the next one is sent
 const MAX_PIXEL_RATIO = 2;
@@ -81,7 +84,8 @@ class View {
     this.clips = [...this.root.querySelectorAll(".clip input")];
     /** @type {State} */
     this.state = { surfaces: [makeSurface(NaN)], selected: 0, camera: null, background: null,
-      samples: 1, max_error: null, by: "proof", time_budget: null, ambient: 0, clip: WHOLE,
+      samples: 1, max_error: null, by: "proof", time_budget: null, voxel_pixels: null, ambient: 0,
+      clip: WHOLE,
       caps: true, color_map: null, planes: [], lights: null, light: null,
       background_top: null, shadow: null, bounce: 0, slices: [], slice_map: GRAY, labels: [],
       step: 0, annotations: NO_ANNOTATIONS };
@@ -152,11 +156,11 @@ class View {
     this.find(".volume").textContent =
       `${x} × ${y} × ${z} ${head.dtype}, ${toShort(head.bits_per_voxel)} bits per voxel`;
     if (this.home.hash && head.title) document.title = `${head.title} – isowave`;
-    for (const part of [this.look, this.labels, this.annotations, this.histogram, this.time]) {
-      part.welcome(head);
-    }
+    for (const part of [this.look, this.labels, this.annotations, this.histogram, this.time,
+      this.quality]) part.welcome(head);
     if (this.isNew && head.scene) this.scenes.use(head.scene);
     if (this.isNew && head.annotations) this.state.annotations = head.annotations;
+    if (this.isNew && head.color_map) this.state.color_map = head.color_map;
     this.isNew = false;
     if (!Number.isFinite(this.surface.isovalue)) this.surface.isovalue = head.isovalue;
     this.showState();
@@ -262,7 +266,6 @@ class View {
   takeCamera(camera) {
     this.state.camera = this.homeCamera = camera;
     this.showState();
-    if (this.state.color_map?.by === "depth") this.push(); // now it is known how deep
   }
 
   /** How far the picture is that is wished for. */
@@ -379,9 +382,10 @@ class View {
     if (this.volume) this.history.note();
     Object.assign(this.state, changes);
     if (changes.camera === null) this.resetDue = true; // pictures before have the camera before
-    // A frame keeps an error or a time; what was given last counts.
+    // A frame keeps an error, or else a time and a detail; what was given last counts.
     if (changes.time_budget) this.state.max_error = null;
-    else if (changes.max_error) this.state.time_budget = null;
+    else if (changes.max_error) this.state.time_budget = this.state.voxel_pixels = null;
+    else if (changes.voxel_pixels) this.state.max_error = null;
     this.clearNote("error");
     this.showState();
     this.push();
