@@ -173,6 +173,8 @@ void write_page(const Volume &volume, const Scene &scene, const fs::path &path,
   if (title.empty()) title = "Volume";
   Scene shown = scene;
   shown.volume.clear();
+  shown.dataset.clear();
+  shown.index.clear();
 
   core::AtomicFile file(path);
   file.write(parts[0] + to_html(title) + parts[1]);

@@ -53,6 +53,10 @@ Scene read_scene_of(const CLI::App &command, ExportArgs &options) {
   if (!options.input.empty()) scene.volume = options.input;
   if (scene.volume.empty())
     throw Error("{}: the scene names no volume: give it before --scene", options.scene);
+  if (options.input.empty() && options.volume.index.empty()) {
+    scene_volume(scene);  // or throws
+    options.volume.index = scene.index;
+  }
   return scene;
 }
 

@@ -13,8 +13,8 @@ const MOST_WORKERS = 8;
 const MOST_BYTES = 1.5e9; // of all workers' engines, about
 const ENGINE_BYTES = 64e6;
 /** What a page's engine does not have: elements of the panel and the menus. */
-const NOT_HERE = ["[name=max_error]", "[name=by]", "[name=time_budget]", "[name=with_bar]",
-  "[name=save_page]", ".budget", "details:has([name=units])"];
+const NOT_HERE = ["[name=max_error]", "[name=by]", "[name=time_budget]", ".levels",
+  "[name=with_bar]", "[name=save_page]", ".budget", "details:has([name=units])"];
 const OF_FIELDS = ["[name=colour_by][value=field]"]; // if the scene has no second volume
 /** Lights of a scene that are its own. */
 const OWN_LIGHTS = { ambient: 0.15, diffuse: 0.5, specular: 0.2, above: 0.45 };
@@ -136,7 +136,8 @@ function sceneOf(wish) {
     ...(wish.background_top && { background_top: wish.background_top }),
     transparent: wish.transparent,
     ...(map && { color_map: map.colors, color_axis: map.axis }),
-    ...(map && map.by !== "axis" && { field: "volume", color_by_field: true,
+    ...(map?.by === "depth" && { color_by_depth: true }),
+    ...(isByField(map) && { field: "volume", color_by_field: true,
       color_caps_alone: map.by === "caps", color_by_label: map.by === "labels" }),
     ...(map?.range && { color_low: map.range[0], color_high: map.range[1] }),
     ...wish.lights,
@@ -177,7 +178,7 @@ function stagesOf(wish) {
 /** Whether rows depend on others: light that bounces is filtered; colours by values begin and end
  * at those that are seen. */
 const isInBands = ({ bounce, color_map: map, surfaces }) =>
-  !bounce && !(map && !["axis", "labels"].includes(map.by) && !map.range && !surfaces.length);
+  !bounce && !(isByField(map) && map.by !== "labels" && !map.range && !surfaces.length);
 
 /** What a server would be: draws the wishes of a view. */
 class LocalScene {

@@ -33,12 +33,14 @@ const QUALITY_ROWS = `
       <select name="ambient"><option value="0">none</option>${
   AMBIENT.map((n) => `<option value="${n}">${n} rays</option>`).join("")
 }</select></label>
+    <div class="levels">
     <label title="Coarser levels of detail are drawn where their voxels lie no further apart on the
 screen: that is faster">Voxels up to
       <span class="unit"><input name="voxel_pixels" type="number" min="0.01" max="1000" step="any"
       placeholder="all"> px</span></label>
     <p class="hint of_levels" hidden>This volume has one level of detail. Start with
       <code>isowave view --levels all FILE</code> for coarser ones.</p>
+    </div>
     <label title="The best picture within this time while you move; it is finished at rest">Time
       per picture
       <span class="unit"><input name="time_budget" type="number"
