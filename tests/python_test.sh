@@ -26,7 +26,7 @@ print("cp312-abi3" if sys.version_info >= (3, 12) else f"{v}-{v}")')
 [[ $wheel == *-$tag-manylinux_* ]] || fail "$wheel is not for $tag"
 unzip -l "$wheel" | grep -q isowave/page.html.gz || fail 'the wheel has no engine for pages'
 unset ISOWAVE_PAGE
-[ "$(stat -c %s "$wheel")" -lt 2800000 ] || fail "the wheel has $(stat -c %s "$wheel") bytes"
+[ "$(stat -c %s "$wheel")" -lt 2900000 ] || fail "the wheel has $(stat -c %s "$wheel") bytes"
 unzip -l "$wheel" | grep -iE 'embree|gmp|itk|gomp' &&
   fail 'the wheel has what a renderer does not need'
 

@@ -109,9 +109,9 @@ def drawn_by_program(page: Any, volume: Path, folder: Path) -> Any:
     command = page.locator("[name=command]").input_value()
     scene = json.loads(re.search(r"END'\n(.*)\nEND\n", command, re.DOTALL)[1])  # type: ignore
     (folder / "scene.json").write_text(json.dumps(scene))
-    size = re.search(r"--size (\S+)", command)[1]  # type: ignore[index]
+    options = re.search(r"(--size .*) -o ", command)[1].split()  # type: ignore[index]
     subprocess.run(
-        [PROGRAM, "render", volume, "--scene", "scene.json", "--size", size, "-o", "a.png"],
+        [PROGRAM, "render", volume, "--scene", "scene.json", *options, "-o", "a.png"],
         cwd=folder,
         check=True,
         stdout=subprocess.DEVNULL,
@@ -162,6 +162,7 @@ def test_drags_isovalues_and_rays_are_drawn(
     rests(page)
     stages = [p["stage"] for p in page.evaluate("window.shownPictures")]
     assert stages[-2:] == ["sharp", "lossless"]
+    assert np.array_equal(shown(page), drawn_by_program(page, FUEL, tmp_path))
     assert page.problems == []
 
 
@@ -303,4 +304,4 @@ def test_the_engine_is_small_and_evaluates_no_texts() -> None:
     )
     assert "eval(" not in page and "new Function" not in page
     engine = re.search(r'id="module">([^<]*)<', page)[1]  # type: ignore[index]
-    assert len(base64.b64decode(engine)) <= 500_000
+    assert len(base64.b64decode(engine)) <= 600_000

@@ -12,7 +12,7 @@ const EXPORT_POP = `
     <div class="buttons"><button type="button" name="shot">Save PNG</button>
       <button type="button" name="stop_export" hidden>Stop</button></div>
     <div class="buttons"><button type="button" name="save_page"
-      title="One HTML file that shows this in any browser, without a server">Save page</button></div>
+      title="One HTML file that shows this in any browser, without server">Save page</button></div>
     <p class="export_progress" role="status"></p>
     <label for="command">The same picture, by a command</label>
     <textarea id="command" name="command" rows="4" readonly spellcheck="false"></textarea>
