@@ -50,7 +50,7 @@ TEST_F(CliColorBy, AxesAndMapsMakeDifferentPictures) {
 TEST_F(CliColorBy, DepthIsAlongTheView) {
   const std::string front = draw("--view front --color-by depth");
   EXPECT_EQ(draw("--view front --color-by 0,0,-1"), front);
-  EXPECT_EQ(draw("--view right --color-by depth"), draw("--view right --color-by 1,0,0"));
+  EXPECT_EQ(draw("--view right --color-by depth"), draw("--view right --color-by=-1,0,0"));
   EXPECT_NE(draw("--view front --color-by depth,-30,0"), front);
   expect_one_line_error("render " + kHead + "--color-by depth,5 --device host",
                         "--color-by depth,5");

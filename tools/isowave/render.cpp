@@ -527,6 +527,8 @@ void run_render(const CLI::App &command, RenderArgs options) {
   read_annotations_of(options, drawing);
   if (!options.scene.save.empty() && num_frames(options, drawing.views.count) > 1)
     throw Error("--save-scene: a scene is one picture: draw one isovalue from one view");
+  if (options.max_image_error && drawing.appearance.color_by_depth && drawing.views.count > 1)
+    throw Error("--max-image-error: colours by depth differ from view to view: draw one view");
   set_wanted(options);
   set_up(command, options, drawing);
   if (options.verbose && drawing.on_device != nullptr)

@@ -154,8 +154,14 @@ BAD_WISHES: list[tuple[dict[str, Any], str]] = [
     ({"caps": 1}, "caps must be true or false"),
     ({"color_map": "magma"}, "color_map must have colors, by, axis and range"),
     ({"color_map": {**COLOR_MAP, "more": 1}}, "color_map must have colors, by, axis and range"),
-    ({"color_map": {**COLOR_MAP, "by": "time"}}, "by of color_map must be one of axis, depth, field"),
-    ({"color_map": {**COLOR_MAP, "by": ["axis"]}}, "by of color_map must be one of axis, depth, field"),
+    (
+        {"color_map": {**COLOR_MAP, "by": "time"}},
+        "by of color_map must be one of axis, depth, field",
+    ),
+    (
+        {"color_map": {**COLOR_MAP, "by": ["axis"]}},
+        "by of color_map must be one of axis, depth, field",
+    ),
     (
         {"color_map": {**COLOR_MAP, "by": "field"}, "max_error": None, "time_budget": 9},
         "colours by the field are drawn without time_budget",
