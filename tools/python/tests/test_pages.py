@@ -22,9 +22,12 @@ import numpy as np
 import pytest
 from browser_pages import FIREFOX, ROOT, browser, keep, menu, open_page
 from PIL import Image
+from viewer_fakes import FakeVolume
+from viewer_scenes import Clock, make_scene
 
 import isowave
 from isowave._page import ENGINE
+from isowave.viewer.protocol import PageFile
 
 PROGRAM = os.environ.get("ISOWAVE_PROGRAM", "isowave")
 FUEL = Path(__file__).resolve().parents[3] / "tests/data/fuel_64x33x32_uint8.raw.gz"
@@ -305,3 +308,16 @@ def test_the_engine_is_small_and_evaluates_no_texts() -> None:
     assert "eval(" not in page and "new Function" not in page
     engine = re.search(r'id="module">([^<]*)<', page)[1]  # type: ignore[index]
     assert len(base64.b64decode(engine)) <= 600_000
+
+
+def test_pages_are_written_by_the_server() -> None:
+    scene = make_scene(FakeVolume(), Clock())
+    heard: list[tuple[dict[str, Any], bytes | None]] = []
+    client = scene.join(lambda head, data: heard.append((head, data)))
+    assert client is not None
+    scene.receive(client, PageFile(json.dumps(SCENE)))
+    head, data = heard[-1]
+    assert head == {"type": "page"} and data is not None and b"<title>" in data
+    scene.receive(client, PageFile('{"a\\nb'))
+    head, data = heard[-1]
+    assert head["type"] == "error" and data is None and "\n" not in head["message"]

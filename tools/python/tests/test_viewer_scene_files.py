@@ -36,7 +36,7 @@ from isowave._color_map import color_map_of
 from isowave._source_file import SourceFile
 from isowave.viewer import command, view
 from isowave.viewer import server as server_module
-from isowave.viewer.protocol import PageFile, SceneFile
+from isowave.viewer.protocol import SceneFile
 from isowave.viewer.scene import Scene
 from isowave.viewer.server import Server
 
@@ -587,16 +587,3 @@ def test_the_command_takes_a_field(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert opened[1] == ("other.nrrd", {}), "they are of the scene's volume"
     file.write_text(json.dumps({**scene, "color_by_field": False}))
     assert served("--scene", str(file))["field"] is None, "its colours do not need it"
-
-
-def test_pages_are_written_by_the_server() -> None:
-    scene = make_scene(FakeVolume(), Clock())
-    heard: list[tuple[dict[str, Any], bytes | None]] = []
-    client = scene.join(lambda head, data: heard.append((head, data)))
-    assert client is not None
-    scene.receive(client, PageFile(json.dumps(SCENE)))
-    head, data = heard[-1]
-    assert head == {"type": "page"} and data is not None and b"<title>" in data
-    scene.receive(client, PageFile('{"a\\nb'))
-    head, data = heard[-1]
-    assert head["type"] == "error" and data is None and "\n" not in head["message"]

@@ -6,17 +6,17 @@
     Scene                     the thread in which all is drawn
     Session (session.py)      a front end's connection
 
-The newest wish of a client counts; it cancels the frame of the one before. A wish is drawn in
-stages: a first picture of a quarter of the width and height; if it asks for more than a ray a
-pixel, a sharp picture of one; the whole picture (sent as JPEG, after passes over the first one);
-once the client rests, the lossless picture (PNG), and what is certain of it. A picture that a time
-has left coarse is drawn to its end before. Clients take turns; a long picture gives way to smaller
-ones between two passes. At most two pictures are on the way to a client; of those that wait for it
-only the last is kept, and it is always sent.
+The newest wish of a client counts; it cancels the frame before. A wish is drawn in stages: a first
+picture, a quarter as wide and high; if it asks for more than a ray a pixel, a sharp picture of
+one; the whole picture (JPEG, after passes over the first); once the client rests, the lossless
+picture (PNG), and what is certain of it. A picture that a time has left coarse is drawn to its end
+before. Clients take turns; a long picture gives way to smaller ones between passes. At most two
+pictures are on the way to a client; the last of those that wait is kept, and always sent.
 """
 
 from __future__ import annotations
 
+import contextlib
 import math
 import threading
 import time
@@ -39,8 +39,7 @@ from .jpeg import encode_jpeg
 from .page_files import page_maker
 from .pictures import Extent, Stopped, annotate, chosen_voxel_pixels, encode_png, laid_over
 from .pictures import opaque, picture_of, share_within
-from .protocol import MAX_FLOAT32, MAX_RAYS, Ack, Budget, Message, Probe, ProtocolError
-from .protocol import PageFile, SceneFile, Wish
+from .protocol import MAX_FLOAT32, MAX_RAYS, Ack, Budget, Message, PageFile, Probe, SceneFile, Wish
 from .renderers import MakeHost, RendererOptions, Renderers, make_host
 from .steps import Steps
 from .turns import Client, Frame, Post, Stage, Turns, after_first
@@ -188,9 +187,7 @@ class Scene:
             if isinstance(message, Ack):
                 client.acknowledge(message.frame, self._clock())
             elif isinstance(message, Wish):
-                if message.step >= len(self._steps):
-                    most = len(self._steps) - 1
-                    raise ProtocolError(f"step must be an integer from 0 to {most}")
+                self._steps.check(message.step)
                 client.take(message)
                 self._renderers.note_needs()
             elif isinstance(message, Budget) and not self._renderers.set_budget(message.bytes):
@@ -591,10 +588,9 @@ class Scene:
             with self._changed:
                 self._broadcast(messages.error(error, None))
             return
-        try:
+        suggested = []
+        with contextlib.suppress(Exception):  # _first_isovalue() told of it, or needs none
             suggested = self._first.suggested_isovalues()
-        except Exception:  # _first_isovalue() told of it, or there is no need of any
-            suggested = []
         message = messages.histogram(counts, edges, suggested)
         with self._changed:
             self._histogram = message

@@ -12,6 +12,7 @@ from typing import Final
 from isowave._source_file import SourceFile
 
 from .interfaces import SeriesLike, VolumeLike
+from .protocol import ProtocolError
 
 STEP_SECONDS: Final = 1.0  # with a step, at most, while other clients wait for another one
 
@@ -64,6 +65,11 @@ class Steps:
 
     def __len__(self) -> int:
         return 1 if self._series is None else len(self._series)
+
+    def check(self, step: int) -> None:
+        """Raises ProtocolError: there is no such step."""
+        if step >= len(self):
+            raise ProtocolError(f"step must be an integer from 0 to {len(self) - 1}")
 
     @property
     def volume(self) -> VolumeLike:
