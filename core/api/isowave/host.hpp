@@ -13,6 +13,7 @@
 #include "isowave/frame.hpp"
 #include "isowave/host_renderer.hpp"
 #include "isowave/mesh.hpp"
+#include "isowave/page.hpp"
 #include "isowave/renderer.hpp"
 #include "isowave/series.hpp"
 #include "isowave/version.hpp"
