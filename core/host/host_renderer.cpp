@@ -450,7 +450,7 @@ bool HostRenderer::for_bands(const FrameRequest &request, Loop loop, Draw draw, 
                all = std::reduce(work.begin(), work.end());
   const std::thread::id own_thread = std::this_thread::get_id();
   std::atomic<std::uint64_t> num_tiles = 0;
-  const std::uint32_t begin_row = rows_of_rays()[0], rows = rows_of_rays()[1];
+  const auto [begin_row, rows] = rows_of_rays();
   const std::uint32_t width = frame_.view.width,
                       tile_rows = std::max(kTileRays / size_.samples, 1u) * size_.samples;
   const std::uint32_t columns = rounded_up(width, kTileRays);
@@ -478,6 +478,7 @@ bool HostRenderer::for_bands(const FrameRequest &request, Loop loop, Draw draw, 
 }
 
 std::array<std::uint32_t, 2> HostRenderer::rows_of_rays() const {
+  if (size_.stride > 1) return {0, size_.ray_rows()};
   return {rows_[0] * size_.samples, std::min(rows_[1], size_.height) * size_.samples};
 }
 

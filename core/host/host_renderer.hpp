@@ -55,6 +55,7 @@ class HostRenderer : public Renderer {
   /// From now on, frames draw the rows of pixels from `begin` to `end` alone, and so do pictures;
   /// what arrays have for other rows says nothing. So several renderers draw a picture together.
   /// Light does not bounce then, since that takes neighbours; a field's range is that of the rows.
+  /// A sample of the rays is drawn whole.
   void set_rows(std::uint32_t begin, std::uint32_t end) { rows_ = {begin, end}; }
   std::vector<HitRecord> cast_rays(std::span<const WorldRay> rays, float isovalue,
                                    Normals normals) override;
@@ -119,7 +120,7 @@ class HostRenderer : public Renderer {
   void blend_bounced(const FrameParams &frame, const LayerBlend &by, const LayerHits &layers);
   template <class Draw, class After>
   bool for_bands(const FrameRequest &request, Loop loop, Draw draw, After after);
-  /// The rows of rays that set_rows() leaves.
+  /// The rows of rays that are drawn: from, to.
   std::array<std::uint32_t, 2> rows_of_rays() const;
 
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();  ///< of making
