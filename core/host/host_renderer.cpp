@@ -450,8 +450,8 @@ bool HostRenderer::for_bands(const FrameRequest &request, Loop loop, Draw draw, 
                all = std::reduce(work.begin(), work.end());
   const std::thread::id own_thread = std::this_thread::get_id();
   std::atomic<std::uint64_t> num_tiles = 0;
-  const auto [begin_row, rows] = rows_of_rays();
-  const std::uint32_t width = frame_.view.width,
+  const std::array<std::uint32_t, 2> drawn = rows_of_rays();
+  const std::uint32_t begin_row = drawn[0], rows = drawn[1], width = frame_.view.width,
                       tile_rows = std::max(kTileRays / size_.samples, 1u) * size_.samples;
   const std::uint32_t columns = rounded_up(width, kTileRays);
   const std::uint32_t band =
