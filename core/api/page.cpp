@@ -79,8 +79,8 @@ fs::path find_engine(const fs::path &wanted) {
     if (!program.empty() && fs::is_regular_file(file, failure)) return file.lexically_normal();
   }
   throw core::Error(
-      "pages need isowave's engine for browsers, which was not built: run tools/wasm, and give "
-      "its share/isowave/{} by --engine or ISOWAVE_PAGE",
+      "pages need isowave's engine for browsers, which was not built: run tools/wasm, and name "
+      "its share/isowave/{} by ISOWAVE_PAGE",
       kEngineName);
 }
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -26,9 +26,6 @@ from isowave._files import (
     source_of_layers,
 )
 from isowave._source_file import SourceFile, text_of_index
-
-if TYPE_CHECKING:
-    from isowave._given_scene import GivenScene
 
 COMMANDS = ("info", "convert", "render", "extract", "compare")
 FIELD = "--color-by"
@@ -152,12 +149,37 @@ def take_chosen(arguments: list[str]) -> tuple[Chosen, Chosen]:
     return Chosen(dataset, index), Chosen(of_field, field_index)
 
 
+class SceneOfFiles(Protocol):
+    """--scene, if a file that it names is such a file: GivenScene."""
+
+    @property
+    def volume(self) -> bool:
+        ...
+
+    @property
+    def field(self) -> bool:
+        ...
+
+    def option(self, path: str) -> Iterator[tuple[int, str]]:
+        ...
+
+    def write(
+        self,
+        folder: str,
+        chosen: Chosen,
+        of_field: Chosen,
+        spacing: Sequence[float] | None,
+        real: dict[str, SourceFile | None],
+    ) -> tuple[str, Any]:
+        ...
+
+
 def with_nrrd(
     arguments: Sequence[str],
     files: Sequence[Given],
     folder: str,
     names_of: dict[str, SourceFile | None] | None = None,
-    scene: GivenScene | None = None,
+    scene: SceneOfFiles | None = None,
 ) -> list[str]:
     """Returns the arguments with NRRD files, written to `folder`, in place of these.
 

@@ -76,7 +76,7 @@ def test_surfaces_have_colours_by_label(volume: isowave.Volume, tmp_path: Path) 
     assert (opened.render(size=SIZE).rgb == image.rgb).all()
     named = volume.render(surfaces=[Surface(labels=3)], color_map=isowave.ColorMap(by="labels"))
     assert named.rgb is not None
-    with pytest.raises(ValueError, match="there are axis, field, caps, labels"):
+    with pytest.raises(ValueError, match="there are axis, depth, field, caps, labels"):
         volume.render(3, color_map=isowave.ColorMap(by="label"))
 
 
