@@ -16,8 +16,6 @@ const ENGINE_BYTES = 64e6;
 const NOT_HERE = ["[name=max_error]", "[name=by]", "[name=time_budget]", ".levels",
   "[name=with_bar]", "[name=save_page]", ".budget", "details:has([name=units])"];
 const OF_FIELDS = ["[name=colour_by][value=field]"]; // if the scene has no second volume
-/** Lights of a scene that are its own. */
-const OWN_LIGHTS = { ambient: 0.15, diffuse: 0.5, specular: 0.2, above: 0.45 };
 
 /** Bytes of base64 text, piece by piece. */
 function fromBase64(text) {
@@ -151,8 +149,9 @@ function sceneOf(wish) {
 function fieldsOf(scene) {
   const toParts = (color) => (typeof color === "string" ? toRgb(color) : color);
   const hasLights = LIGHTS.some((name) => name in scene);
+  const weights = LIGHTS.map((name, i) => [name, WEIGHTS[i]]);
   return {
-    clip: [], slices: [], ...(hasLights && OWN_LIGHTS), ...scene,
+    ...(hasLights && Object.fromEntries(weights)), ...scene,
     clip: (scene.clip ?? []).map((plane) => ({ offset: 0, ...plane })),
     slices: (scene.slices ?? []).map((slice) =>
       ({ offset: 0, opacity: 1, clipped: true, ...slice })),

@@ -66,10 +66,10 @@ def given_files(arguments: Sequence[str]) -> list[Given]:
     for at, (before, text) in enumerate(zip(arguments, arguments[1:]), 1):
         if before == FIELD or text.startswith(f"{FIELD}="):
             name = text.removeprefix(f"{FIELD}=")
-            path = max((name[:end] for end in _ends(name) if _is_there(name[:end])), default="")
+            path = max((name[:end] for end in _ends(name) if is_there(name[:end])), default="")
             if path:
                 found.append(Given(at, path, name[len(path) :], is_field=True))
-        elif not text.startswith("-") and _is_there(text):
+        elif not text.startswith("-") and is_there(text):
             if not before.startswith("-"):
                 is_given = arguments[0] != "compare" or not _is_picture(text)
             else:
@@ -84,7 +84,8 @@ def _ends(name: str) -> list[int]:
     return [i for i, letter in enumerate(name) if letter == ","] + [len(name)]
 
 
-def _is_there(path: str) -> bool:
+def is_there(path: str) -> bool:
+    """Whether packages read a file, a folder, or files of a pattern, which are there."""
     is_there = os.path.exists(path) or is_pattern(path)
     return is_there and is_read_by_packages(path)
 

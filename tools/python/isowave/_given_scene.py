@@ -10,12 +10,11 @@ from typing import Any
 
 from isowave import _core
 from isowave._core import Error
-from isowave._files import is_pattern, is_read_by_packages
-from isowave._given_files import FIELD, Chosen, Given, as_nrrd, take_option
+from isowave._files.kinds import OF_THE_COMPILED_PART
+from isowave._given_files import FIELD, Chosen, Given, as_nrrd, is_there, take_option
 from isowave._source_file import SourceFile, text_of_index
 
 OPTION = "--scene"
-_NATIVE = (".nrrd", ".nhdr", ".mha", ".mhd", ".raw", ".raw.gz", ".nii", ".nii.gz", ".zfp")
 
 
 @dataclass(frozen=True)
@@ -95,19 +94,15 @@ def given_scene(arguments: Sequence[str], files: Sequence[Given]) -> GivenScene 
     except Error:  # the program says why
         return None
     names_volume = any(not each.is_field for each in files) or _names_volume(arguments)
-    volume = not names_volume and _is_there(fields["volume"])
+    volume = not names_volume and is_there(fields["volume"])
     if not (names_volume or volume) and fields["dataset"]:
         dataset, name = fields["dataset"], fields["volume"]
         raise Error(f"{name}: dataset {dataset}: this file has one array, without a name")
     is_named = bool(fields["color_by_field"]) and fields["field"] not in ("", "volume")
-    field = is_named and _is_there(fields["field"])
+    field = is_named and is_there(fields["field"])
     if not volume and not field:
         return None
     return GivenScene(at, path, fields, volume, field, is_joined)
-
-
-def _is_there(path: str) -> bool:
-    return (os.path.exists(path) or is_pattern(path)) and is_read_by_packages(path)
 
 
 def _names_volume(arguments: Sequence[str]) -> bool:
@@ -115,7 +110,7 @@ def _names_volume(arguments: Sequence[str]) -> bool:
     return any(
         before != FIELD
         and not text.startswith("-")
-        and (text.lower().endswith(_NATIVE) or text.startswith("generate:"))
+        and (text.lower().endswith(OF_THE_COMPILED_PART) or text.startswith("generate:"))
         for before, text in zip(arguments, arguments[1:])
     )
 

@@ -123,7 +123,7 @@ def drawn_by_program(page: Any, volume: Path, folder: Path) -> Any:
     return np.asarray(Image.open(folder / "a.png"))
 
 
-def test_the_page_has_the_programs_bits_and_asks_nobody(
+def test_the_page_has_the_programs_bits_and_asks_no_server(
     open_page: Callable[..., Any], html: Path, tmp_path: Path
 ) -> None:
     page = opened(open_page, html)
