@@ -196,7 +196,7 @@ TEST(HostBlocks, ThreadsThatMeetAtABlockSeeItWhole) {
           const glm::uvec3 end = glm::min(at + 1u, size - 1u);
           const std::size_t last = end.x + size.x * (end.y + std::size_t{size.y} * end.z);
           num_wrong += field.changing[block] != expected.changing[block] ||
-                       std::memcmp(field.values + 64 * last, expected.values + 64 * last,
+                       std::memcmp(&field.values[64 * last], &expected.values[64 * last],
                                    64 * sizeof(float)) != 0;
         });
       });
@@ -204,7 +204,7 @@ TEST(HostBlocks, ThreadsThatMeetAtABlockSeeItWhole) {
     threads.clear();
     EXPECT_EQ(num_wrong, 0);
     // Values of the turn before must not pass for those of the next.
-    std::memset(const_cast<float *>(field.values), 0xFF, 64 * num_blocks * sizeof(float));
+    std::memset(&field.values[0], 0xFF, 64 * num_blocks * sizeof(float));
   }
 }
 

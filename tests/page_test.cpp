@@ -10,11 +10,15 @@
 #include <cstdlib>
 #include <isowave/isowave.hpp>
 #include <isowave/page.hpp>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "core/host/host_renderer.hpp"
 #include "core/io/png.hpp"
+#include "core/zfp/chunk_file.hpp"
 #include "tests/api_support.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/run_program.hpp"
@@ -34,7 +38,8 @@ using testing::HasSubstr;
 
 constexpr const char *kFuelFile = ISOWAVE_TEST_DATA "/fuel_64x33x32_uint8.raw.gz";
 constexpr const char *kPlaces =
-    "<title>@ISOWAVE_TITLE@</title>[@ISOWAVE_POSTER@]<@ISOWAVE_SCENE@>(@ISOWAVE_VOLUME@)end";
+    "{@ISOWAVE_CONNECT@}<title>@ISOWAVE_TITLE@</title>[@ISOWAVE_POSTER@]<@ISOWAVE_SCENE@>"
+    "(@ISOWAVE_VOLUME@)end";
 
 std::filesystem::path write_engine(const TemporaryFolder &folder, const std::string &text) {
   const std::filesystem::path path = folder / "engine.html.gz";
@@ -75,6 +80,7 @@ TEST(Page, HoldsTheVolumeTheSceneAndItsPicture) {
   const std::string page = read_file(folder / "page.html");
   EXPECT_EQ(between(page, "<title>", "</title>"), "a &#60;b&#62; &#38; c");
   EXPECT_EQ(page.substr(page.size() - 4), ")end");
+  EXPECT_EQ(page.substr(0, 2), "{}") << "asks no server";
 
   volume->save(folder / "volume.zfp");
   EXPECT_EQ(decoded(between(page, "(", ")")), read_file(folder / "volume.zfp"));
@@ -127,7 +133,6 @@ TEST(Page, RefusesWhatAPageDoesNotShow) {
               HasSubstr("colours by a second volume"));
   EXPECT_THAT(refused([](Scene &s) { s.camera.emplace().parallel_height = 3; }),
               HasSubstr("parallel"));
-  EXPECT_THAT(refused([](Scene &s) { s.appearance.transparent = true; }), HasSubstr("transparent"));
   EXPECT_THAT(refused([](Scene &s) { s.appearance.color_table.resize(256); }),
               HasSubstr("tables of colours"));
   EXPECT_THAT(refused([](Scene &s) { s.surfaces[0].clipped = false; }), HasSubstr("clipped"));
@@ -186,6 +191,47 @@ TEST_F(CliExport, OneIsovalueOrAScene) {
   ASSERT_EQ(run_isowave("export " + in("v.zfp") + engine() + " -o " + in("c.html")).status, 0);
   EXPECT_EQ(decoded(between(read_file(folder_ / "c.html"), "(", ")")),
             read_file(folder_ / "v.zfp"));
+}
+
+TEST_F(CliExport, ASiteHasAPageAndTheVolumeInChunks) {
+  const std::string fuel = std::string("export ") + kFuelFile + engine() + " -i 10 --site ";
+  std::filesystem::create_directory(folder_ / "there");
+  for (const std::string &name : {"there", "new/site"}) {
+    const auto done = run_isowave(fuel + in(name));
+    ASSERT_EQ(done.status, 0) << done.err;
+    EXPECT_THAT(done.out, HasSubstr("volume.chunks: "));
+    const std::string page = read_file(folder_ / name / "index.html"),
+                      volume = read_file(folder_ / name / "volume.chunks");
+    EXPECT_EQ(between(page, "{", "}"), " connect-src 'self';");
+    EXPECT_TRUE(parse_scene(between(page, "]<", ">(")).camera) << "the picture's";
+    const auto about = nlohmann::json::parse(between(page, "(", ")"));
+    EXPECT_EQ(about.at("file"), "volume.chunks");
+    EXPECT_EQ(about.at("bytes"), volume.size());
+    EXPECT_EQ(about.at("range"), nlohmann::json({0, 255}));
+    const std::size_t head_bytes = about.at("head_bytes");
+    const core::CompressedVolume read =
+        core::read_chunks_head(std::as_bytes(std::span(volume)).first(head_bytes), volume.size());
+    EXPECT_EQ(read.info.dims, glm::uvec3(64, 33, 32));
+    EXPECT_EQ(read.coarser_levels.size(), 3u);
+  }
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder_ / "there"), {}), 2);
+}
+
+TEST_F(CliExport, ASiteThatFailsLeavesNothing) {
+  const std::string fuel = std::string("export ") + kFuelFile + engine();
+  expect_one_line_error(fuel + " -i 10 --site " + in("s") + " -o " + in("a.html"), "--output");
+  expect_one_line_error("export " + in("no.zfp") + engine() + " --site " + in("s"), "no.zfp");
+  write_file(folder_ / "file", "");
+  expect_one_line_error(fuel + " --site " + in("file"), "is no folder");
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "s"));
+  const PageOptions options{.engine = write_engine(folder_, kPlaces), .poster = {8, 8}};
+  Scene scene;  // without surfaces
+  EXPECT_THAT(error_of([&] { save_site(public_volume(), scene, folder_ / "s", options); }),
+              HasSubstr("surfaces"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "s"));
+  scene.surfaces = {{.isovalue = 10}};
+  save_site(public_volume(), scene, folder_ / "s", options);
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "s" / "volume.chunks"));
 }
 
 TEST_F(CliExport, WrongInputIsOneLine) {

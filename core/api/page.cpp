@@ -5,17 +5,23 @@
 #include <algorithm>
 #include <array>
 #include <cstdlib>
+#include <nlohmann/json.hpp>
 #include <span>
 #include <string_view>
+#include <system_error>
 #include <vector>
 
 #include "core/api/guarded.hpp"
 #include "core/api/volume_implementation.hpp"
+#include "core/api/voxel_histogram.hpp"
 #include "core/base/error.hpp"
+#include "core/host/host_blocks.hpp"
 #include "core/io/atomic_file.hpp"
 #include "core/io/byte_source.hpp"
 #include "core/io/file_name.hpp"
 #include "core/platform/process.hpp"
+#include "core/zfp/chunk_file.hpp"
+#include "core/zfp/make_levels.hpp"
 #include "core/zfp/zfp_file.hpp"
 #include "isowave/host_renderer.hpp"
 
@@ -30,6 +36,9 @@ constexpr std::uint64_t kMostMebibytes = 350;
 constexpr std::uint64_t kMostEngineBytes = 1u << 25;
 constexpr std::size_t kMostPlanes = 8;  ///< as the viewer has it
 constexpr const char *kEngineName = "page.html.gz";
+constexpr const char *kSitePage = "index.html", *kSiteVolume = "volume.chunks";
+/// What a site's page may do, too: read files beside it.
+constexpr std::string_view kSiteConnect = " connect-src 'self';";
 /// Places of the engine, seen from the program's folder: installed, built, in Python's package.
 constexpr std::array kEngineFolders = {"../share/isowave", "wasm/install/share/isowave",
                                        "../wasm/install/share/isowave", ".."};
@@ -103,20 +112,21 @@ void check_for_page(const Scene &scene) {
   refuse(scene.camera && scene.camera->parallel_height, "a parallel view (parallel_height)");
   refuse(!scene.field.empty() && scene.field != "volume", "a second volume (field)");
   refuse(look.color_by_field && scene.field.empty(), "colours by a second volume");
-  refuse(look.transparent, "a transparent background");
   refuse(!look.color_table.empty() || !look.slice_table.empty(), "tables of colours");
   refuse(any([](const Surface &each) { return !each.clipped; }), "surfaces with clipped: false");
   refuse(any([](const Surface &each) { return !each.mapped; }), "surfaces with mapped: false");
   refuse(scene.clip.size() > kMostPlanes, "more than eight clipping planes");
 }
 
-std::vector<std::uint8_t> draw_poster(const std::shared_ptr<const Volume> &volume,
-                                      const Scene &scene, ImageSize size) {
+/// The picture of a page's scene, which gets a camera if it has none.
+std::vector<std::uint8_t> draw_poster(const std::shared_ptr<const Volume> &volume, Scene &scene,
+                                      ImageSize size) {
   Renderer renderer = make_host_renderer(
       volume, {.field = scene.field.empty() ? nullptr : volume, .largest = size});
   FrameRequest request = scene_request(scene);
+  if (!scene.camera) scene.camera = request.camera = renderer.camera(scene.surfaces, size);
   request.size = size;
-  if (!scene.camera) request.camera = renderer.camera(scene.surfaces, size);
+  request.appearance.transparent = false;  // as the page shows it
   return encode_png(renderer.render(request));
 }
 
@@ -146,8 +156,9 @@ std::string to_json_of_page(const std::string &json) {
   return result;
 }
 
-constexpr std::array<std::string_view, 4> kPlaces = {"@ISOWAVE_TITLE@", "@ISOWAVE_POSTER@",
-                                                     "@ISOWAVE_SCENE@", "@ISOWAVE_VOLUME@"};
+constexpr std::array<std::string_view, 5> kPlaces = {"@ISOWAVE_CONNECT@", "@ISOWAVE_TITLE@",
+                                                     "@ISOWAVE_POSTER@", "@ISOWAVE_SCENE@",
+                                                     "@ISOWAVE_VOLUME@"};
 /// The engine's text before, between and behind kPlaces.
 using EngineParts = std::array<std::string, kPlaces.size() + 1>;
 
@@ -166,8 +177,14 @@ EngineParts read_parts(const fs::path &wanted) {
   return parts;
 }
 
-void write_page(const Volume &volume, const Scene &scene, const fs::path &path,
-                const PageOptions &options, std::span<const std::uint8_t> poster) {
+/// Writes a page.
+///
+/// connect       what the page's policy allows beside what all pages need
+/// write_volume  writes what stands in the volume's place
+template <class WriteVolume>
+void write_page(const Scene &scene, const fs::path &path, const PageOptions &options,
+                std::span<const std::uint8_t> poster, std::string_view connect,
+                const WriteVolume &write_volume) {
   const EngineParts parts = read_parts(options.engine);
   std::string title = options.title.empty() ? scene.volume.filename().string() : options.title;
   if (title.empty()) title = "Volume";
@@ -177,17 +194,66 @@ void write_page(const Volume &volume, const Scene &scene, const fs::path &path,
   shown.index.clear();
 
   core::AtomicFile file(path);
-  file.write(parts[0] + to_html(title) + parts[1]);
+  file.write(parts[0]);
+  file.write(connect);
+  file.write(parts[1] + to_html(title) + parts[2]);
   Base64Text picture(file);
   picture.write(std::as_bytes(poster));
   picture.finish();
-  file.write(parts[2] + to_json_of_page(scene_text(shown)) + parts[3]);
-  Base64Text bytes(file);
-  core::give_zfp_file(volume.implementation().volume, path,
-                      [&](std::span<const std::byte> piece) { bytes.write(piece); });
-  bytes.finish();
-  file.write(parts[4]);
+  file.write(parts[3] + to_json_of_page(scene_text(shown)) + parts[4]);
+  write_volume(file);
+  file.write(parts[5]);
   file.commit();
+}
+
+/// Writes a volume in chunks, with all levels of detail that it can have.
+core::ChunkFileSize write_site_volume(const core::CompressedVolume &volume,
+                                      core::AtomicFile &file) {
+  std::vector<core::CompressedVolume> made;
+  if (volume.coarser_levels.empty()) made = core::make_levels(volume);
+  std::vector<const core::CompressedVolume *> levels = {&volume};
+  for (const core::CompressedVolume &level : made.empty() ? volume.coarser_levels : made)
+    levels.push_back(&level);
+  std::vector<core::MacrocellRanges> ranges;
+  for (const core::CompressedVolume *level : levels) {
+    const core::HostBlocks blocks(*level, core::HostBlocks::kNoLimit, 0);
+    ranges.push_back(blocks.macrocell_ranges());
+  }
+  return core::write_chunks(levels, ranges, file);
+}
+
+/// A folder that is made if it is missing, and removed again unless it is to be kept. A group of
+/// outputs makes its folders itself.
+class NewFolder {
+ public:
+  explicit NewFolder(const fs::path &folder) : folder_(folder) {
+    std::error_code failure;
+    if (core::OutputGroup::current() != nullptr) return;
+    is_new_ = fs::create_directory(folder, failure);
+    if (failure)
+      throw core::Error("cannot make the folder {}: {}", folder.string(), failure.message());
+  }
+  ~NewFolder() {
+    std::error_code failure;
+    if (is_new_) fs::remove(folder_, failure);
+  }
+  NewFolder(const NewFolder &) = delete;
+  NewFolder &operator=(const NewFolder &) = delete;
+  void keep() { is_new_ = false; }
+
+ private:
+  fs::path folder_;
+  bool is_new_ = false;
+};
+
+/// What a site's page knows of its volume before it has asked for the file.
+std::string text_of_site(const Volume &volume, const core::ChunkFileSize &size) {
+  const VoxelHistogram values = voxel_histogram(volume);
+  return nlohmann::json{{"file", kSiteVolume},           {"bytes", size.bytes},
+                        {"head_bytes", size.head_bytes}, {"id", fmt::format("{:08x}", size.id)},
+                        {"counts", values.counts},       {"range", values.range},
+                        {"suggested", values.suggested}}
+      .dump();
 }
 
 }  // namespace
@@ -213,8 +279,43 @@ void save_page(const std::shared_ptr<const Volume> &volume, const Scene &scene,
           "the volume has {} MiB, and a page holds {}: compress it with a larger tolerance, or at "
           "a lower rate",
           mebibytes, kMostMebibytes);
-    const std::vector<std::uint8_t> poster = draw_poster(volume, scene, options.poster);
-    write_page(*volume, scene, path, options, poster);
+    Scene shown = scene;
+    const std::vector<std::uint8_t> poster = draw_poster(volume, shown, options.poster);
+    write_page(scene, path, options, poster, {}, [&](core::AtomicFile &file) {
+      Base64Text bytes(file);
+      core::give_zfp_file(volume->implementation().volume, path,
+                          [&](std::span<const std::byte> piece) { bytes.write(piece); });
+      bytes.finish();
+    });
+  });
+}
+
+std::array<fs::path, 2> site_files(const fs::path &folder) {
+  return {folder / kSitePage, folder / kSiteVolume};
+}
+
+void check_site(const Scene &scene, const PageOptions &options) {
+  core::guarded("writing a site", [&] {
+    check_for_page(scene);
+    read_parts(options.engine);
+  });
+}
+
+void save_site(const std::shared_ptr<const Volume> &volume, const Scene &scene,
+               const fs::path &folder, const PageOptions &options) {
+  core::guarded("writing a site", [&] {
+    if (!volume) throw core::Error("a site needs a volume");
+    check_site(scene, options);
+    const auto [page, chunks] = site_files(folder);
+    NewFolder new_folder(folder);
+    Scene shown = scene;
+    const std::vector<std::uint8_t> poster = draw_poster(volume, shown, options.poster);
+    core::AtomicFile file(chunks);
+    const core::ChunkFileSize size = write_site_volume(volume->implementation().volume, file);
+    write_page(shown, page, options, poster, kSiteConnect,
+               [&](core::AtomicFile &to) { to.write(text_of_site(*volume, size)); });
+    file.commit();
+    new_folder.keep();
   });
 }
 

@@ -8,9 +8,9 @@
 #include <utility>
 
 #include "core/base/parallel_for.hpp"
-#include "core/platform/memory.hpp"
 #include "core/view/frame.hpp"
 #include "core/volume/range_thresholds.hpp"
+#include "core/zfp/block_chunks.hpp"
 #include "kernels_cl/portable/block_bound.h"
 #include "kernels_cl/portable/block_cells.h"
 #include "kernels_cl/portable/label_table.h"
@@ -19,8 +19,6 @@ namespace isowave::core {
 
 namespace {
 
-/// Blocks whose bits are read at a time.
-constexpr std::uint64_t kRunBlocks = 1024;
 /// Macrocells that a thread looks at at a time.
 constexpr std::uint64_t kRunMacrocells = 1024;
 constexpr std::uint32_t kEdge = ISO_MACROCELL_BLOCKS;
@@ -32,17 +30,6 @@ static_assert(HostField::kDecoded > kBeingMade);
 
 /// Least number of pages: each block of a dual grid may lie on a page of its own.
 constexpr std::uint64_t kLeastPages = 8 + 1;
-
-/// Item `number` of a grid of at most ISO_MAX_BLOCK_IDS, x first. By 32 bits, which processors
-/// divide faster.
-glm::uvec3 place_of(std::uint64_t number, const glm::uvec3 &size) {
-  const auto id = static_cast<std::uint32_t>(number);
-  return {id % size.x, id / size.x % size.y, id / size.x / size.y};
-}
-
-glm::uvec3 corner_of(uint corner) {
-  return {corner & 1, corner >> 1 & 1, corner >> 2};
-}
 
 void add(std::optional<BlockBox> &box, const glm::ivec3 &block) {
   if (!box) box = BlockBox{block, block + 1};
@@ -56,17 +43,8 @@ void add(std::optional<BlockBox> &box, const std::optional<BlockBox> &other) {
   add(box, other->end - 1);
 }
 
-void add(BlockRange &range, const BlockRange &by) {
-  range.min = std::min(range.min, by.min);
-  range.max = std::max(range.max, by.max);
-}
-
 void fill(std::vector<std::atomic<uchar>> &states, uchar value) {
   for (std::atomic<uchar> &state : states) state.store(value, std::memory_order_relaxed);
-}
-
-std::uint64_t num_pages(std::uint64_t num_bytes) {
-  return (num_bytes + platform::page_bytes() - 1) / platform::page_bytes();
 }
 
 }  // namespace
@@ -85,25 +63,22 @@ HostValues::HostValues(const CompressedVolume &level, bool is_finest, double vox
   unit = offset.unit;
 }
 
-HostBlocks::Pages::Pages(std::uint64_t num_bytes)
-    : memory(num_bytes), taken(num_pages(num_bytes)) {}
-
-std::uint64_t HostBlocks::bytes(const VolumeInfo &info) {
+std::uint64_t HostBlocks::bytes(const VolumeInfo &info, bool is_in_chunks) {
   const BlockGrid grid = make_grid(info);
   const std::uint64_t num_blocks = block_count(grid), macrocells = num_macrocells(grid);
-  return macrocells * 65 * sizeof(BlockRange) + num_blocks +
-         num_pages(num_blocks * ISO_BLOCK_VOXELS * sizeof(float)) + kNumThresholds * sizeof(float) +
+  return macrocells * (is_in_chunks ? 1 : 65) * sizeof(BlockRange) + num_blocks +
+         Values::table_bytes(num_blocks * ISO_BLOCK_VOXELS) + kNumThresholds * sizeof(float) +
          bytes_per_isovalue(info);
 }
 
 std::uint64_t HostBlocks::bytes_per_isovalue(const VolumeInfo &info) {
   const BlockGrid grid = make_grid(info);
   const std::uint64_t num_blocks = block_count(grid);
-  return num_macrocells(grid) * sizeof(ulong) + num_blocks + num_pages(num_blocks * sizeof(ulong));
+  return num_macrocells(grid) * sizeof(ulong) + num_blocks + Changing::table_bytes(num_blocks);
 }
 
 std::uint64_t HostBlocks::ray_bytes() {
-  return kLeastPages * platform::page_bytes();
+  return kLeastPages * Values::page_bytes();
 }
 
 HostBlocks::HostBlocks(const CompressedVolume &volume, std::uint64_t memory_limit,
@@ -124,166 +99,41 @@ HostBlocks::HostBlocks(const CompressedVolume &volume, HostRoom &room, std::uint
       blocks_(volume.num_blocks()),
       macrocells_((blocks_ + kEdge - 1u) / kEdge),
       num_macrocells_(num_macrocells(make_grid(volume.info))),
-      values_(volume.block_count() * ISO_BLOCK_VOXELS * sizeof(float)),
+      values_(volume.block_count() * ISO_BLOCK_VOXELS),
       decoded_(volume.block_count()),
       decoded_as_(volume),
       labels_(std::move(labels)) {
   selections_.push_back(std::make_unique<Selection>(*this));
   find_ranges();
-  room.hold(bytes(volume.info));
+  room.hold(bytes(volume.info, volume.chunks != nullptr));
   room.add([this] { drop(); });
 }
 
 HostBlocks::Selection::Selection(HostBlocks &blocks)
     : of(&blocks),
       masks(blocks.num_macrocells_),
-      changing(blocks.decoded_.size() * sizeof(ulong)),
+      changing(blocks.decoded_.size()),
       opened(blocks.decoded_.size()),
       number(kFirstSelection) {}
 
-/// As far as decode() needs it, in host memory.
+/// As far as decode() needs it, in host memory or in a chunk.
 EncodedBlock HostBlocks::encoded(std::size_t block) const {
   const WholeNumbers whole = whole_numbers_of(volume_->info.type, volume_->precision);
-  return {.words = volume_->words.data(),
-          .first_bit = volume_->block_begin(block),
-          .num_bits = volume_->block_bits(block),
+  const BlockChunks::Block of =
+      volume_->chunks
+          ? volume_->chunks->block(block)
+          : BlockChunks::Block{volume_->words.data(), volume_->block_begin(block),
+                               volume_->block_bits(block), volume_->no_data.mask(block)};
+  return {.words = of.words,
+          .first_bit = of.first_bit,
+          .num_bits = of.num_bits,
           .min_exponent = volume_->precision.min_exponent,
           .least = whole.least,
           .greatest = whole.greatest,
           .size_x = 4,
           .size_y = 4,
           .size_z = 4,
-          .no_data = volume_->no_data.mask(block)};
-}
-
-// ---- Value ranges
-
-/// Layer by layer of blocks, since a block's dual cells have voxels of the layer above it.
-void HostBlocks::find_ranges() {
-  constexpr float kInfinity = std::numeric_limits<float>::infinity();
-  ranges_.low.assign(64 * num_macrocells_, kInfinity);
-  ranges_.high.assign(64 * num_macrocells_, -kInfinity);
-  macrocell_ranges_.low.assign(num_macrocells_, kInfinity);
-  macrocell_ranges_.high.assign(num_macrocells_, -kInfinity);
-  std::vector<float> sampled(2 * range_sample(volume_->block_count()).count);
-  std::vector<BlockRange> layer(8 * std::size_t{blocks_.x} * blocks_.y), above(layer.size());
-  ranges_of_layer(0, layer, sampled);
-  for (std::uint32_t z = 0; z < blocks_.z; ++z) {
-    if (z + 1 < blocks_.z) ranges_of_layer(z + 1, above, sampled);
-    set_dual_ranges(z, layer, above);
-    layer.swap(above);
-  }
-  thresholds_ = range_thresholds(std::move(sampled));
-}
-
-void HostBlocks::show_labels(const std::vector<std::uint8_t> &labels) {
-  if (labels == labels_) return;
-  labels_ = labels;
-  for (const auto &selection : selections_) selection->isovalue.reset();
-  forget();
-  find_ranges();
-}
-
-/// Voxels of a block, as the group's field has them.
-void HostBlocks::to_group(float *values) const {
-  for (uint v = 0; v < ISO_BLOCK_VOXELS; ++v)
-    values[v] = is_label(values[v]) ? static_cast<float>(labels_[static_cast<uint>(values[v])]) : 0;
-}
-
-/// As HostLoops::ranges().
-void HostBlocks::ranges_of_labels(const EncodedBlock &block, BlockRange *parts) const {
-  alignas(64) std::array<float, ISO_BLOCK_VOXELS> values;
-  host_loops().decode(block, values.data());
-  to_group(values.data());
-  for (uint part = 0; part < 8; ++part) {
-    const uint end_x = (part & 1) != 0 ? 1 : block.size_x,
-               end_y = (part & 2) != 0 ? 1 : block.size_y,
-               end_z = (part & 4) != 0 ? 1 : block.size_z;
-    parts[part] = {1, 0};
-    for (uint z = 0; z < end_z; ++z) {
-      for (uint y = 0; y < end_y; ++y) {
-        for (uint x = 0; x < end_x; ++x) {
-          const float value = values[x + 4 * y + 16 * z];
-          add(parts[part], {value, value});
-        }
-      }
-    }
-  }
-}
-
-/// Writes the value ranges of the eight parts of each block of layer z.
-///
-/// ranges   [block][8]
-/// sampled  gets the ranges of the blocks that thresholds are made of
-void HostBlocks::ranges_of_layer(std::uint32_t z, std::span<BlockRange> ranges,
-                                 std::span<float> sampled) const {
-  const std::uint64_t num_blocks = std::uint64_t{blocks_.x} * blocks_.y, layer = z * num_blocks;
-  const RangeSample sample = range_sample(volume_->block_count());
-  parallel_for(
-      (num_blocks + kRunBlocks - 1) / kRunBlocks, num_threads_,
-      [&](std::uint64_t run, std::uint32_t) {
-        const std::uint64_t first = layer + run * kRunBlocks,
-                            end = layer + std::min(num_blocks, (run + 1) * kRunBlocks);
-        std::vector<uint> words;
-        std::uint64_t begin_bit = 0;
-        if (volume_->file) {
-          begin_bit = volume_->block_begin(first);
-          words.resize((volume_->block_begin(end) - begin_bit + 31) / 32 + kDecoderAhead);
-          volume_->read_words(begin_bit, words);
-        }
-        for (std::uint64_t block = first; block < end; ++block) {
-          EncodedBlock bits = encoded(block);
-          const glm::uvec3 size = volume_->info.dims - 4u * place_of(block, blocks_);
-          bits.size_x = std::min(size.x, 4u);
-          bits.size_y = std::min(size.y, 4u);
-          bits.size_z = std::min(size.z, 4u);
-          if (volume_->file) bits.words = words.data();
-          bits.first_bit -= begin_bit;
-          BlockRange *parts = ranges.data() + 8 * (block - layer);
-          if (labels_.empty()) {
-            host_loops().ranges(bits, parts);
-          } else {
-            ranges_of_labels(bits, parts);
-          }
-          const std::uint64_t number = block / sample.stride;
-          if (number >= sample.count ||
-              sampled_block(static_cast<uint>(number * sample.stride), sample.stride) != block)
-            continue;
-          sampled[2 * number] = parts[0].min;
-          sampled[2 * number + 1] = parts[0].max;
-        }
-      });
-}
-
-/// Sets the ranges of dual grids of layer z, from ranges_of_layer() of z and of z + 1.
-void HostBlocks::set_dual_ranges(std::uint32_t z, std::span<const BlockRange> layer,
-                                 std::span<const BlockRange> above) {
-  const glm::uvec3 dims = volume_->info.dims;
-  if (z >= num_owning_blocks(dims.z)) return;
-  const glm::uvec2 owning(num_owning_blocks(dims.x), num_owning_blocks(dims.y));
-  // Rows of macrocells, so that no two threads write to one.
-  parallel_for(macrocells_.y, num_threads_, [&](std::uint64_t row, std::uint32_t) {
-    const auto begin = static_cast<uint>(kEdge * row), end = std::min(begin + kEdge, owning.y);
-    for (uint y = begin; y < end; ++y) {
-      for (uint x = 0; x < owning.x; ++x) {
-        BlockRange range = layer[8 * (x + std::size_t{blocks_.x} * y)];
-        for (uint corner = 1; corner < 8; ++corner) {
-          const glm::uvec3 at = glm::uvec3(x, y, z) + corner_of(corner);
-          if (!glm::all(glm::lessThan(at, blocks_))) continue;
-          add(range,
-              (at.z > z ? above : layer)[8 * (at.x + std::size_t{blocks_.x} * at.y) + corner]);
-        }
-        const std::size_t macrocell =
-            x / kEdge + macrocells_.x * (row + std::size_t{macrocells_.y} * (z / kEdge));
-        const std::size_t i = 64 * macrocell + x % kEdge + 4 * (y % kEdge) + 16 * (z % kEdge);
-        ranges_.low[i] = range.min;
-        ranges_.high[i] = range.max;
-        float &low = macrocell_ranges_.low[macrocell], &high = macrocell_ranges_.high[macrocell];
-        low = std::min(low, range.min);
-        high = std::max(high, range.max);
-      }
-    }
-  });
+          .no_data = of.no_data};
 }
 
 /// The box around the blocks for which there are bits in holds(macrocell), called by all threads.
@@ -353,6 +203,7 @@ ulong HostBlocks::blocks_that_hold(std::size_t macrocell, float isovalue) const 
   if (!may_hold(macrocell_ranges_.low[macrocell], macrocell_ranges_.high[macrocell], widest,
                 isovalue))
     return 0;
+  if (volume_->chunks) return owning_blocks(macrocell);
   if (decoded_as_.plane_error == 0 && decoded_as_.uniform == 0)
     return host_loops().inside(high, isovalue) & ~host_loops().inside(low, isovalue);
   ulong mask = 0;
@@ -362,6 +213,19 @@ ulong HostBlocks::blocks_that_hold(std::size_t macrocell, float isovalue) const 
     const glm::uvec3 block = first + glm::uvec3(bit & 3, bit >> 2 & 3, bit >> 4);
     const bool holds = !has_codes || may_hold(low[bit], high[bit], dual_grid_code(block), isovalue);
     mask |= static_cast<ulong>(holds) << bit;
+  }
+  return mask;
+}
+
+/// Those of a macrocell's blocks that have dual cells.
+ulong HostBlocks::owning_blocks(std::size_t macrocell) const {
+  const glm::uvec3 first = kEdge * place_of(macrocell, macrocells_), dims = volume_->info.dims,
+                   end(num_owning_blocks(dims.x), num_owning_blocks(dims.y),
+                       num_owning_blocks(dims.z));
+  ulong mask = 0;
+  for (uint bit = 0; bit < 64; ++bit) {
+    const glm::uvec3 block = first + glm::uvec3(bit & 3, bit >> 2 & 3, bit >> 4);
+    mask |= static_cast<ulong>(glm::all(glm::lessThan(block, end))) << bit;
   }
   return mask;
 }
@@ -408,6 +272,8 @@ void HostBlocks::select(Selection &selection, float isovalue) {
 /// macrocell_masks() takes a block as active whose range, rounded outward to thresholds, has values
 /// below the isovalue and values not below it.
 std::optional<BlockBox> HostBlocks::rounded_box(float isovalue) const {
+  if (volume_->chunks)
+    return box_of([&](std::size_t macrocell) { return blocks_that_hold(macrocell, isovalue); });
   const std::uint32_t index = threshold_index(thresholds_, double{isovalue});
   if (index == 0 || index == kNumThresholds) return {};
   const float below = thresholds_[index - 1], above = thresholds_[index];
@@ -438,10 +304,11 @@ std::array<float, 2> HostBlocks::extremes() const {
 
 HostField HostBlocks::field(std::size_t selection) {
   Selection &of = *selections_.at(selection);
-  return {.values = values(),
-          .changing = of.changing_cells(),
+  return {.values = values_.items(),
+          .changing = of.changing.items(),
           .masks = of.masks.data(),
-          .highs = ranges_.high.data(),
+          .highs = volume_->chunks ? nullptr : ranges_.high.data(),
+          .macrocell_highs = macrocell_ranges_.high.data(),
           .has_gaps = !volume_->no_data.empty(),
           .decoded = decoded_.data(),
           .opened = of.opened.data(),
@@ -455,17 +322,28 @@ void HostBlocks::open(Selection &selection, std::size_t block) {
   // Beyond the volume, any voxels do: they matter to cells outside it alone.
   for (uint corner = 0; corner < 8; ++corner)
     dual_grid[corner] = block_at(glm::min(place + corner_of(corner), blocks_ - 1u));
+  check_chunks(dual_grid);
   room_->with_room([&] {
     for (const std::size_t id : dual_grid) decode_once(id);
-    take_page(selection.changing, block * sizeof(ulong));
+    take_page(selection.changing, block);
     find_changing(selection, block, dual_grid);
   });
 }
 
 void HostBlocks::decode(std::span<const std::size_t> blocks) {
+  check_chunks(blocks);
   room_->with_room([&] {
     for (const std::size_t id : blocks) decode_once(id);
   });
+}
+
+/// Throws ChunkIsMissing if blocks are not there; all chunks that they lack are then noted.
+void HostBlocks::check_chunks(std::span<const std::size_t> blocks) const {
+  if (!volume_->chunks) return;
+  bool are_there = true;
+  for (const std::size_t id : blocks)
+    are_there = (is_decoded(id) || volume_->chunks->is_there(id)) && are_there;
+  if (!are_there) throw ChunkIsMissing();
 }
 
 void HostBlocks::decode_once(std::size_t block) {
@@ -480,9 +358,8 @@ void HostBlocks::decode_once(std::size_t block) {
     // Acquires what a thread wrote that was stopped by an exception.
     if (!state.compare_exchange_weak(seen, kBeingMade, std::memory_order_acquire)) continue;
     try {
-      constexpr std::uint64_t kBytes = ISO_BLOCK_VOXELS * sizeof(float);
-      take_page(values_, block * kBytes);
-      decode_to(block, values() + ISO_BLOCK_VOXELS * block);
+      take_page(values_, ISO_BLOCK_VOXELS * block);
+      decode_to(block, values(block));
       seen = HostField::kDecoded;
     } catch (...) {
       state.store(kNone, std::memory_order_release);
@@ -530,24 +407,22 @@ void HostBlocks::find_changing(Selection &selection, std::size_t block,
     if (!state.compare_exchange_weak(seen, kBeingMade, std::memory_order_acquire)) continue;
     ulong inside[8];
     for (uint corner = 0; corner < 8; ++corner) {
-      inside[corner] =
-          host_loops().inside(values() + ISO_BLOCK_VOXELS * dual_grid[corner], isovalue);
+      inside[corner] = host_loops().inside(values(dual_grid[corner]), isovalue);
     }
-    selection.changing_cells()[block] = changing_cells(inside);
+    selection.changing.items()[block] = changing_cells(inside);
     seen = selection.number;
     state.store(seen, std::memory_order_release);
     state.notify_all();
   }
 }
 
-/// The page that this byte is on will be written to. It counts before it is marked as taken, so
-/// that none is ever written to without having been counted.
-void HostBlocks::take_page(Pages &pages, std::uint64_t byte) {
-  const std::uint64_t page_bytes = platform::page_bytes();
-  std::atomic<uchar> &taken = pages.taken[byte / page_bytes];
-  if (taken.load(std::memory_order_relaxed) != 0) return;
-  room_->take(page_bytes);
-  if (taken.exchange(1, std::memory_order_relaxed) != 0) room_->give_back(page_bytes);
+/// The page of this item will be written to. The page counts before it is marked as taken, so that
+/// none is ever written to without having been counted.
+template <class T>
+void HostBlocks::take_page(BlockPages<T> &pages, std::size_t item) {
+  if (pages.is_taken(item)) return;
+  room_->take(pages.page_bytes());
+  if (!pages.take(item)) room_->give_back(pages.page_bytes());
 }
 
 bool HostBlocks::is_decoded(std::size_t block) const {
@@ -566,12 +441,9 @@ void HostBlocks::drop() {
   for (const auto &selection : selections_) release(selection->changing);
 }
 
-void HostBlocks::release(Pages &pages) {
-  const auto num_taken = std::ranges::count_if(
-      pages.taken, [](const std::atomic<uchar> &taken) { return taken.load() != 0; });
-  pages.memory.release();
-  fill(pages.taken, 0);
-  room_->give_back(static_cast<std::uint64_t>(num_taken) * platform::page_bytes());
+template <class T>
+void HostBlocks::release(BlockPages<T> &pages) {
+  room_->give_back(pages.release() * pages.page_bytes());
 }
 
 }  // namespace isowave::core

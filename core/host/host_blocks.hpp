@@ -12,10 +12,11 @@
 #include <span>
 #include <vector>
 
-#include "core/base/reserved_memory.hpp"
+#include "core/host/block_pages.hpp"
 #include "core/host/host_loops.hpp"
 #include "core/host/host_room.hpp"
 #include "core/volume/block_box.hpp"
+#include "core/zfp/block_chunks.hpp"
 #include "core/zfp/level_bounds.hpp"
 #include "core/zfp/zfp_stream.hpp"
 
@@ -44,8 +45,9 @@ struct HostValues {
 /// The blocks of a volume. Not thread-safe, except the functions that rays call (BlockMaker).
 class HostBlocks {
  public:
-  /// Memory of a volume with this grid if nothing is decoded, for one isovalue.
-  static std::uint64_t bytes(const VolumeInfo &info);
+  /// Memory of a volume with this grid if nothing is decoded, for one isovalue. is_in_chunks: see
+  /// CompressedVolume::chunks
+  static std::uint64_t bytes(const VolumeInfo &info, bool is_in_chunks = false);
   /// Memory of each further isovalue.
   static std::uint64_t bytes_per_isovalue(const VolumeInfo &info);
   /// Room for the blocks that a single ray needs at a time.
@@ -55,7 +57,8 @@ class HostBlocks {
   static constexpr std::uint64_t kNoLimit = HostRoom::kNoLimit;
 
   /// Decodes the finest level once, only for the ranges. This takes 128 more bytes for each block
-  /// of a layer along z.
+  /// of a layer along z. The ranges of a volume in chunks are those of its macrocells, which are
+  /// there; rays that come to a chunk that is missing end with ChunkIsMissing.
   ///
   /// volume        must outlive this
   /// memory_limit  bound on bytes(); at least least_bytes()
@@ -120,17 +123,17 @@ class HostBlocks {
   std::optional<BlockBox> rounded_box(float isovalue) const;
   /// The least and the largest of all voxels with data, of all bit planes.
   std::array<float, 2> extremes() const;
+  /// Value ranges of the cells of macrocells, x fastest, of all bit planes.
+  MacrocellRanges macrocell_ranges() const {
+    return {macrocell_ranges_.low, macrocell_ranges_.high};
+  }
 
  private:
-  /// An array of which only parts are written to, page by page.
-  struct Pages {
-    Pages(std::uint64_t num_bytes);
-    ReservedMemory memory;
-    std::vector<std::atomic<uchar>> taken;  ///< [page]
-  };
+  using Values = BlockPages<float>;
+  using Changing = BlockPages<ulong>;
 
   /// Dual cells of each block [macrocell][64]: the order of masks. Blocks without such cells:
-  /// ranges that hold nothing.
+  /// ranges that hold nothing. Of a volume in chunks, empty.
   struct DualRanges {
     std::vector<float> low, high;
   };
@@ -141,11 +144,9 @@ class HostBlocks {
     void open(std::size_t block) override { of->open(*this, block); }
     void decode(std::span<const std::size_t> blocks) override { of->decode(blocks); }
 
-    ulong *changing_cells() const { return static_cast<ulong *>(changing.memory.data()); }
-
     HostBlocks *of;
     std::vector<ulong> masks;  ///< as in HostField
-    Pages changing;            ///< [block]
+    Changing changing;         ///< [block]
     std::vector<std::atomic<uchar>> opened;
     uchar number;
     std::optional<float> isovalue;
@@ -158,17 +159,22 @@ class HostBlocks {
   void open(Selection &selection, std::size_t block);
   void decode(std::span<const std::size_t> blocks);
   void drop();
-  void release(Pages &pages);
-  void take_page(Pages &pages, std::uint64_t byte);
+  template <class T>
+  void release(BlockPages<T> &pages);
+  template <class T>
+  void take_page(BlockPages<T> &pages, std::size_t item);
+  void check_chunks(std::span<const std::size_t> blocks) const;
   void decode_once(std::size_t block);
   void decode_to(std::size_t block, float *values) const;
   void find_changing(Selection &selection, std::size_t block,
                      std::span<const std::size_t, 8> dual_grid);
 
+  ulong owning_blocks(std::size_t macrocell) const;
   ulong blocks_that_hold(std::size_t macrocell, float isovalue) const;
   bool may_hold(float low, float high, std::uint32_t bound_code, float isovalue) const;
   std::uint32_t dual_grid_code(const glm::uvec3 &block) const;
   void find_ranges();
+  void take_ranges_of_chunks();
   void to_group(float *values) const;
   void ranges_of_labels(const EncodedBlock &block, BlockRange *parts) const;
   void ranges_of_layer(std::uint32_t z, std::span<BlockRange> ranges,
@@ -182,7 +188,14 @@ class HostBlocks {
   std::size_t block_at(const glm::uvec3 &block) const {
     return block.x + blocks_.x * (block.y + std::size_t{blocks_.y} * block.z);
   }
-  float *values() const { return static_cast<float *>(values_.memory.data()); }
+  float *values(std::size_t block) const { return &values_.items()[ISO_BLOCK_VOXELS * block]; }
+  /// Item `number` of a grid of at most ISO_MAX_BLOCK_IDS, x first. By 32 bits, which processors
+  /// divide faster.
+  static glm::uvec3 place_of(std::uint64_t number, const glm::uvec3 &size) {
+    const auto id = static_cast<std::uint32_t>(number);
+    return {id % size.x, id / size.x % size.y, id / size.x / size.y};
+  }
+  static glm::uvec3 corner_of(uint corner) { return {corner & 1, corner >> 1 & 1, corner >> 2}; }
 
   const CompressedVolume *volume_;
   std::unique_ptr<HostRoom> own_room_;
@@ -193,7 +206,7 @@ class HostBlocks {
   DualRanges ranges_;
   DualRanges macrocell_ranges_;  ///< [macrocell]
   std::vector<float> thresholds_;
-  Pages values_;  ///< [block][64]
+  Values values_;  ///< [block][64]
   std::vector<std::atomic<uchar>> decoded_;
   std::atomic<std::uint64_t> num_decoded_ = 0;
   HostValues decoded_as_;

@@ -12,7 +12,7 @@ std::uint64_t HostLevels::least_bytes(const CompressedVolume &volume, std::size_
                                       bool at_levels) {
   std::uint64_t sum = HostBlocks::ray_bytes();
   for (const CompressedVolume *level : levels_of(volume, true))
-    sum += HostBlocks::bytes(level->info);
+    sum += HostBlocks::bytes(level->info, level->chunks != nullptr);
   for (const CompressedVolume *level : levels_of(volume, at_levels))
     sum += (num_surfaces - 1) * HostBlocks::bytes_per_isovalue(level->info);
   return sum;

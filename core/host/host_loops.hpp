@@ -13,6 +13,7 @@
 
 #include "core/frame/appearance.hpp"
 #include "core/frame/surfaces.hpp"
+#include "core/host/block_pages.hpp"
 #include "core/view/given_rays.hpp"
 #include "kernels_cl/portable/bounce.h"
 #include "kernels_cl/portable/clip.h"
@@ -43,6 +44,8 @@ class BlockMaker {
  public:
   /// Makes the data that a ray needs in a block: the voxels of its dual grid, and its changing
   /// cells.
+  ///
+  /// Throws  ChunkIsMissing; and decode(), too
   virtual void open(std::size_t block) = 0;
   /// Decodes some blocks, up to eight.
   virtual void decode(std::span<const std::size_t> blocks) = 0;
@@ -55,12 +58,14 @@ class BlockMaker {
 /// crosses. Decoded blocks stay as long as rays are traced. For a thread that traces alone
 /// (HostBlocks::run) they stay until the next call of open() or of the maker.
 struct HostField {
-  const float *values;    ///< [block][64] x + 4y + 16z; of decoded blocks
-  const ulong *changing;  ///< [open block] bit x + 4y + 16z: do the corners of the cell differ?
-  const ulong *masks;     ///< [macrocell] bit x + 4y + 16z: may the block have a cell that does?
+  BlockItems<float> values;  ///< [block][64] x + 4y + 16z; of decoded blocks
+  BlockItems<ulong>
+      changing;        ///< [open block] bit x + 4y + 16z: do the corners of the cell differ?
+  const ulong *masks;  ///< [macrocell] bit x + 4y + 16z: may the block have a cell that does?
   /// [macrocell][64] largest value of the block's cells; of blocks without a bit in masks, it is on
-  /// the side of all of them.
+  /// the side of all of them. Null: not known, but that of the macrocells' cells.
   const float *highs;
+  const float *macrocell_highs;       ///< [macrocell] the same
   bool has_gaps;                      ///< voxels without data
   const std::atomic<uchar> *decoded;  ///< [block] kDecoded: its values are there
   const std::atomic<uchar> *opened;   ///< [block] selection: it is open
@@ -104,8 +109,9 @@ inline uint side_of_block(const FrameParams &frame, const HostField &field, Bloc
       b.x / kBlocks + columns * (b.y / kBlocks + static_cast<ulong>(rows) * (b.z / kBlocks));
   const uint bit = b.x % kBlocks + 4 * (b.y % kBlocks) + 16 * (b.z % kBlocks);
   if (field.has_gaps || (field.masks[macrocell] >> bit & 1u) != 0) return ISO_SIDE_UNKNOWN;
-  return field.highs[64 * macrocell + bit] - frame.surface.isovalue >= 0.0f ? ISO_SIDE_INSIDE
-                                                                            : ISO_SIDE_OUTSIDE;
+  const float high =
+      field.highs != nullptr ? field.highs[64 * macrocell + bit] : field.macrocell_highs[macrocell];
+  return high - frame.surface.isovalue >= 0.0f ? ISO_SIDE_INSIDE : ISO_SIDE_OUTSIDE;
 }
 
 class HostFieldValues;

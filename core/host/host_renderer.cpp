@@ -27,6 +27,8 @@ namespace {
 
 /// Rays along a tile's edge, about: neighbours walk through the same blocks.
 constexpr std::uint32_t kTileRays = 16;
+/// The same of a volume in chunks: the rays of a tile wait together.
+constexpr std::uint32_t kWaitingTileRays = 8;
 /// Tiles of a band for each thread: enough that no thread waits long for the last.
 constexpr std::uint32_t kTilesPerThread = 8;
 /// Rays of any origin that a thread takes at a time.
@@ -124,6 +126,7 @@ Abilities HostRenderer::abilities_of(const CompressedVolume &volume) {
 
 FrameStats HostRenderer::render(const FrameRequest &request) {
   const auto begin = std::chrono::steady_clock::now();
+  any_waits_ = false;
   check(request, abilities());
   const ImageSize size = size_of(request, abilities());
   if (rows_[0] >= std::min(rows_[1], size.height))
@@ -152,7 +155,7 @@ void HostRenderer::draw_picture(const FrameParams &frame, ImageSize size,
   size_ = size;
   open_ = {};
   field_values_.clear();
-  colors_ = std::move(colors);
+  if (!goes_on_) colors_ = std::move(colors);
   try {
     draw();
   } catch (...) {
@@ -438,7 +441,8 @@ void HostRenderer::filter_bounced(const View &view, std::span<const GivenRay> pl
 
 /// Calls draw(tile, is_alone), as HostBlocks::run() does, for the tiles of all of the frame's rays,
 /// in bands of whole rows of pixels from the top; after each band, on_pass(after(rows that are
-/// done)). Returns false if on_pass says to stop, and there is more to draw: bands or other loops.
+/// done)). Returns false if on_pass says to stop, and there is more to draw: bands or other loops;
+/// or if tiles wait for chunks.
 template <class Draw, class After>
 bool HostRenderer::for_bands(const FrameRequest &request, Loop loop, Draw draw, After after) {
   const OnPass &on_pass = request.on_pass;
@@ -452,20 +456,25 @@ bool HostRenderer::for_bands(const FrameRequest &request, Loop loop, Draw draw, 
   std::atomic<std::uint64_t> num_tiles = 0;
   const std::array<std::uint32_t, 2> drawn = rows_of_rays();
   const std::uint32_t begin_row = drawn[0], rows = drawn[1], width = frame_.view.width,
-                      tile_rows = std::max(kTileRays / size_.samples, 1u) * size_.samples;
-  const std::uint32_t columns = rounded_up(width, kTileRays);
+                      tile_rays = volume_.chunks ? kWaitingTileRays : kTileRays,
+                      tile_rows = std::max(tile_rays / size_.samples, 1u) * size_.samples;
+  const std::uint32_t columns = rounded_up(width, tile_rays);
   const std::uint32_t band =
       on_pass ? tile_rows * rounded_up(kTilesPerThread * thread_count(num_threads_), columns)
               : rows - begin_row;
+  if (volume_.chunks && loop == Loop::kHits && !goes_on_)
+    finished_.assign(std::size_t{columns} * rounded_up(rows - begin_row, tile_rows), 0);
   for (std::uint32_t row = begin_row; row < rows; row += band) {
     const std::uint32_t end_row = std::min(rows - row, band) + row;
     levels_.room().run(
         std::uint64_t{columns} * rounded_up(end_row - row, tile_rows),
         [&](std::uint64_t tile, bool is_alone) {
-          const auto x = static_cast<std::uint32_t>(tile % columns * kTileRays),
+          const auto x = static_cast<std::uint32_t>(tile % columns * tile_rays),
                      y = static_cast<std::uint32_t>(row + tile / columns * tile_rows);
-          draw(RayTile{x, y, std::min(x + kTileRays, width), std::min(y + tile_rows, end_row)},
-               is_alone);
+          draw_or_wait(loop, tile, [&] {
+            draw(RayTile{x, y, std::min(x + tile_rays, width), std::min(y + tile_rows, end_row)},
+                 is_alone);
+          });
           const double share =
               double(++num_tiles) / (columns * rounded_up(rows - begin_row, tile_rows));
           if (request.on_progress && std::this_thread::get_id() == own_thread)
@@ -474,7 +483,21 @@ bool HostRenderer::for_bands(const FrameRequest &request, Loop loop, Draw draw, 
     const PassStats pass = after(end_row);
     if (on_pass && !on_pass(pass) && (end_row < rows || more_follows)) return false;
   }
-  return true;
+  return !any_waits_;
+}
+
+/// Calls draw() unless the tile is finished already. A tile whose chunks are not there waits.
+template <class Draw>
+void HostRenderer::draw_or_wait(Loop loop, std::uint64_t tile, Draw draw) {
+  if (!volume_.chunks) return draw();
+  const bool keeps = loop == Loop::kHits && tile < finished_.size();
+  if (keeps && finished_[tile] != 0) return;
+  try {
+    draw();
+    if (keeps) finished_[tile] = 1;
+  } catch (const ChunkIsMissing &) {
+    any_waits_ = true;
+  }
 }
 
 std::array<std::uint32_t, 2> HostRenderer::rows_of_rays() const {

@@ -7,6 +7,7 @@
 // they come to, which stay decoded for further frames.
 
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <optional>
@@ -57,6 +58,10 @@ class HostRenderer : public Renderer {
   /// Light does not bounce then, since that takes neighbours; a field's range is that of the rows.
   /// A sample of the rays is drawn whole.
   void set_rows(std::uint32_t begin, std::uint32_t end) { rows_ = {begin, end}; }
+  /// Of a volume in chunks: whether the next frame goes on with the last, which has the same
+  /// request and rows, and waited for chunks (FrameStats::cancelled). Tiles that were finished
+  /// stay, and do not count in its statistics. Not with FrameRequest::on_pass.
+  void go_on(bool goes_on) { goes_on_ = goes_on; }
   std::vector<HitRecord> cast_rays(std::span<const WorldRay> rays, float isovalue,
                                    Normals normals) override;
   Camera camera(std::span<const float> isovalues, std::optional<ImageSize> size = {},
@@ -107,6 +112,8 @@ class HostRenderer : public Renderer {
                      ImageSize size, FrameStats &stats);
   std::uint64_t trace(std::span<const HostLevel> drawing, const RayTile &tile, bool is_alone,
                       bool is_smooth);
+  template <class Draw>
+  void draw_or_wait(Loop loop, std::uint64_t tile, Draw draw);
   template <class DrawTile>
   void draw_bands(const FrameRequest &request, DrawTile draw_tile, FrameStats &stats);
   void add_field_values(const FrameRequest &request, FrameStats &stats);
@@ -134,6 +141,9 @@ class HostRenderer : public Renderer {
   FrameParams frame_{};  ///< of the finest level, for shading
   ImageSize size_;
   std::array<std::uint32_t, 2> rows_{0, ~0u};  ///< that are drawn: from, to
+  bool goes_on_ = false;
+  std::atomic<bool> any_waits_ = false;  ///< a tile of the frame, for chunks
+  std::vector<std::uint8_t> finished_;   ///< [tile] of a volume in chunks
   std::vector<HitRecord> hits_;
   OpenCounts open_;
   std::vector<RayColor> colors_;          ///< of a frame of several or translucent surfaces

@@ -25,6 +25,19 @@ inline void macrocell_bits(const PacketField *field, Ints macrocells, Mask lanes
   gather_halves(field->masks, macrocells, lanes, low, high);
 }
 
+inline void gather_items(BlockItems<ulong, true> from, Ints numbers, Mask lanes, Ints *low,
+                         Ints *high) {
+  gather_halves(from.items, numbers, lanes, low, high);
+}
+inline void gather_items(BlockItems<ulong, false> from, Ints numbers, Mask lanes, Ints *low,
+                         Ints *high) {
+  ISO_EACH_LANE(lane, lanes) {
+    const ulong number = from[static_cast<std::size_t>(numbers[lane])];
+    (*low)[lane] = static_cast<int>(number);
+    (*high)[lane] = static_cast<int>(number >> 32);
+  }
+}
+
 /// Calls HostField::open() once for each block. Lanes have few different blocks.
 inline Mask open_blocks(const PacketField *field, const FrameParams *frame, const Ints *at,
                         Mask lanes, Ints *low, Ints *high) {
@@ -36,7 +49,7 @@ inline Mask open_blocks(const PacketField *field, const FrameParams *frame, cons
     field->open(static_cast<uint>(block));
     left &= ~bits_of(blocks == block);
   }
-  gather_halves(field->changing, blocks, lanes, low, high);
+  gather_items(field->changing, blocks, lanes, low, high);
   return ints(0);
 }
 

@@ -167,7 +167,7 @@ class HostExtractor {
       const uint id = dual_grid_block(&frame_, entry.block, corner);
       if (id != ISO_INVALID_ID)
         result.at(corner) =
-            host_loops().inside(field_.values + std::size_t{ISO_BLOCK_VOXELS} * id, isovalue_);
+            host_loops().inside(&field_.values[std::size_t{ISO_BLOCK_VOXELS} * id], isovalue_);
     }
     return result;
   }

@@ -8,6 +8,12 @@
 
 namespace isowave::core::platform {
 
+/// Whether memory that is taken costs nothing until it is written to.
+#ifdef __EMSCRIPTEN__
+inline constexpr bool kHasPages = false;
+#else
+inline constexpr bool kHasPages = true;
+#endif
 /// Bytes of a page, by which the system provides memory.
 std::uint64_t page_bytes();
 /// Bytes of the host's memory, used or not; 0 if the system does not say.

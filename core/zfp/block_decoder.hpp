@@ -20,6 +20,8 @@ class BlockDecoder {
   /// Throws  Error: the file is shorter than it was, or cannot be read
   void load(std::uint64_t first, std::uint64_t count);
   /// The voxels x + 4 y + 16 z of a block that is ready, with padding; voxels without data are NaN.
+  ///
+  /// Throws  ChunkIsMissing: of a volume in chunks
   void decode(std::uint64_t id, std::span<float, ISO_BLOCK_VOXELS> voxels) const;
 
  private:

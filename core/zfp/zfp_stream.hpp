@@ -21,6 +21,7 @@
 
 namespace isowave::core {
 
+class BlockChunks;
 class InputFile;
 class LevelCoder;
 struct CompressOptions;
@@ -105,7 +106,9 @@ struct CompressedVolume {
   std::vector<std::uint32_t> words;
   std::shared_ptr<const InputFile> file{};  ///< holds the payload instead of `words`
   std::uint64_t file_first_bit = 0;         ///< first bit of the payload in the file
-  NoData no_data{};                         ///< its voxels without data
+  /// The payload comes from afar, chunk by chunk: words, index and file are empty.
+  std::shared_ptr<BlockChunks> chunks{};
+  NoData no_data{};  ///< its voxels without data
   /// [min, max] of the source's voxels with data, as float32 and after map_nan.
   std::array<float, 2> value_range = kUnknownRange;
   /// Largest |decoded - source| of voxels with data, if it was measured. An error that a device has

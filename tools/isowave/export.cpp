@@ -1,4 +1,4 @@
-// isowave export: a page that shows a volume in any browser, without a server.
+// isowave export: a page that shows a volume in any browser, or a site of it for a server of files.
 
 #include <fmt/format.h>
 
@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <system_error>
 
 #include "core/api/volume_implementation.hpp"
 #include "core/base/error.hpp"
@@ -24,7 +25,7 @@ namespace isowave::core::tools {
 namespace {
 
 struct ExportArgs {
-  std::string input, scene, output;
+  std::string input, scene, output, site;
   std::optional<double> isovalue;
   VolumeOptions volume;
   CompressionOptions compression;
@@ -60,16 +61,38 @@ Scene read_scene_of(const CLI::App &command, ExportArgs &options) {
   return scene;
 }
 
+/// Looks at the outputs before any work, and sets the page's name if there is none.
+void check_outputs(const CLI::App &command, ExportArgs &options, const Scene &scene) {
+  Outputs outputs;
+  outputs.read_volume(scene.volume.string());
+  outputs.read(options.scene);
+  if (!options.site.empty()) {
+    refuse_options(command, {"--output"}, "--site names the folder of all files: leave it out");
+    check_site(scene, options.page);
+    std::error_code failure;
+    if (!std::filesystem::is_directory(options.site, failure)) {
+      outputs.write_folder("--site", options.site);
+      return outputs.make_folder();
+    }
+    for (const std::filesystem::path &file : isowave::site_files(options.site))
+      outputs.write("--site", file);
+    return;
+  }
+  if (options.output.empty()) options.output = volume_stem(scene.volume.string()) + ".html";
+  outputs.write("--output", options.output);
+  check_page(scene, options.output, options.page);
+}
+
+void tell_of(const std::string &file, const char *more) {
+  fmt::print("wrote {}: {} bytes{}\n", one_line(file),
+             with_commas(OutputGroup::current()->bytes_of(file)), more);
+}
+
 void run_export(const CLI::App &command, ExportArgs options) {
   Scene scene = read_scene_of(command, options);
   const std::string input = scene.volume.string();
   const bool names_output = options.output.empty();
-  if (names_output) options.output = volume_stem(input) + ".html";
-  Outputs outputs;
-  outputs.read_volume(input);
-  outputs.read(options.scene);
-  outputs.write("--output", options.output);
-  check_page(scene, options.output, options.page);
+  check_outputs(command, options, scene);
 
   const auto volume = std::make_shared<Volume>(std::make_unique<Volume::Implementation>(
       load_volume(input, to_overrides(options.volume), options.compression),
@@ -83,10 +106,14 @@ void run_export(const CLI::App &command, ExportArgs options) {
   for (const isowave::Surface &surface : scene.surfaces) {
     if (surface.labels.empty()) warn_of_isovalue(compressed, surface.isovalue);
   }
-  save_page(volume, scene, options.output, options.page);
-  fmt::print("wrote {}: {} bytes{}\n", one_line(options.output),
-             with_commas(OutputGroup::current()->bytes_of(options.output)),
-             names_output ? "; --output names another file" : "");
+  if (options.site.empty()) {
+    save_page(volume, scene, options.output, options.page);
+    tell_of(options.output, names_output ? "; --output names another file" : "");
+    return;
+  }
+  save_site(volume, scene, options.site, options.page);
+  for (const std::filesystem::path &file : isowave::site_files(options.site))
+    tell_of(file.string(), "");
 }
 
 }  // namespace
@@ -108,6 +135,9 @@ void add_export(CLI::App &app) {
   command->add_option("--output,-o", options->output,
                       "file that ends in .html; it holds the volume and all that draws it "
                       "[VOLUME.html in the current folder]");
+  command->add_option("--site", options->site,
+                      "folder that is made for a server of files: the page, index.html, and the "
+                      "volume, of any size, which the page reads in parts by HTTP range requests");
   command->add_option("--title", options->page.title, "the page's title [the volume's name]");
   command->add_option("--engine", options->page.engine,
                       "page.html.gz, which tools/wasm makes [ISOWAVE_PAGE, or the one that was "
@@ -115,7 +145,7 @@ void add_export(CLI::App &app) {
   add_volume_options(*command, options->volume);
   add_compression_options(*command, options->compression);
   group_options(*command, "Options of every day",
-                {"--help", "--isovalue", "--scene", "--output", "--title", "--engine"});
+                {"--help", "--isovalue", "--scene", "--output", "--site", "--title", "--engine"});
   group_volume_options(*command);
   group_compression_options(*command);
   command->callback([command, options] { run_export(*command, *options); });

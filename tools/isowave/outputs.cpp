@@ -72,9 +72,7 @@ void Outputs::write(const std::string &option, const fs::path &path) {
   if (probed_.insert(folder).second || fs::exists(path, failure)) AtomicFile{path};
 }
 
-void Outputs::write_pictures(const std::string &option, const fs::path &folder,
-                             const std::string &prefix) {
-  if (folder.empty()) return;
+bool Outputs::write_folder(const std::string &option, const fs::path &folder) {
   refuse_standard_output(option, folder);
   std::error_code failure;
   fs::path existing = folder,
@@ -87,12 +85,17 @@ void Outputs::write_pictures(const std::string &option, const fs::path &folder,
     throw Error("cannot make the folder {}: {} is no folder", folder.string(), existing.string());
   if (!platform::can_fill(existing, failure))
     throw Error("cannot make or fill the folder {}: {}", folder.string(), failure.message());
-  if (!made.empty()) {
-    new_folder_ = folder;
-    if (const auto user = users_.find(key_of(made)); user != users_.end())
-      throw Error("{} {}: it would take the place of {}", option, folder.string(), user->second);
-    return;
-  }
+  if (made.empty()) return false;
+  new_folder_ = folder;
+  if (const auto user = users_.find(key_of(made)); user != users_.end())
+    throw Error("{} {}: it would take the place of {}", option, folder.string(), user->second);
+  return true;
+}
+
+void Outputs::write_pictures(const std::string &option, const fs::path &folder,
+                             const std::string &prefix) {
+  if (folder.empty() || write_folder(option, folder)) return;
+  std::error_code failure;
   const std::string folder_key = platform::identity_of(folder, failure);
   if (failure) return;
   for (const std::string &name : platform::names_in(folder)) {

@@ -20,6 +20,9 @@ class Outputs {
   /// written, or is a file that read() or write() was called with: by any name, also through
   /// symbolic and hard links.
   void write(const std::string &option, const std::filesystem::path &path);
+  /// Announces a folder that may be missing; make_folder() then makes it. Throws Error if that
+  /// cannot be, or the folder cannot be filled. Returns whether it is missing.
+  bool write_folder(const std::string &option, const std::filesystem::path &folder);
   /// Announces a folder for files PREFIX*.png whose number is not known yet; make_folder() makes
   /// the folder if it is missing. Call it after all read() and write(): throws Error also if one of
   /// their files has such a name.

@@ -6,13 +6,18 @@
 //
 //   open    path, keep: keep the .zfp file's bytes -> facts of the volume, as the viewer's
 //   "welcome"
-//           has them; bytes of a .zfp file if it was none
+//           has them; bytes of a .zfp file if it was none. chunks: path has the head of a file of
+//           chunks, and this is the file's size
+//   supply  path, parts [[begin, end], ...] of that file, whose bytes path has one behind the other
 //   scene   text -> fields: the scene's, without those that have their defaults
 //   camera  scene, size [width, height] -> camera, which the surfaces fill
 //   draw    scene, size, samples, ambient, rows [begin, end]; png -> what was drawn; bytes: RGBA of
 //           these rows, or a PNG file of the whole picture
 //   probe   scene, size, at [x, y], 0 to 1 -> position, value: what is seen there, or null
-//   histogram  bins -> counts, range, suggested isovalues
+//   histogram  -> counts, range, suggested isovalues
+//
+// An answer may be {"missing": [[begin, end], ...]} instead: parts of the file of chunks without
+// which the request cannot be answered. When they were supplied, it is made again.
 
 #include <emscripten.h>
 
@@ -31,7 +36,12 @@
 #include "core/api/guarded.hpp"
 #include "core/api/renderer_implementation.hpp"
 #include "core/api/volume_implementation.hpp"
+#include "core/api/voxel_histogram.hpp"
+#include "core/base/error.hpp"
 #include "core/host/host_renderer.hpp"
+#include "core/io/input_file.hpp"
+#include "core/zfp/chunk_file.hpp"
+#include "core/zfp/voxel_region.hpp"
 #include "core/zfp/zfp_file.hpp"
 #include "isowave/host.hpp"
 #include "isowave/scene.hpp"
@@ -42,22 +52,32 @@ namespace {
 
 using nlohmann::json;
 
-/// Voxels that the histogram is made of, about.
-constexpr std::uint64_t kSampledVoxels = 1u << 21;
+/// Bounds of the blocks that stay decoded, and of the chunks that stay when a picture is done.
+constexpr std::uint64_t kDecodedBytes = 384u << 20, kChunkBytes = 128u << 20;
+
+std::vector<std::byte> read_file(const std::string &path) {
+  const core::InputFile file(path);
+  std::vector<std::byte> bytes(file.size());
+  file.read(0, bytes);
+  return bytes;
+}
 
 /// A volume, and what draws it.
 struct Opened {
-  explicit Opened(const std::string &path) : volume(open_volume(path)) {
+  explicit Opened(std::shared_ptr<const Volume> of) : volume(std::move(of)) {
     in_memory = volume->implementation().volume;
-    in_memory.coarser_levels.clear();  // the finest draws all
+    if (!in_memory.chunks) in_memory.coarser_levels.clear();  // the finest draws all
     if (in_memory.file) {
       in_memory.words.resize(in_memory.word_count());
       in_memory.read_words(0, in_memory.words);
       in_memory.file.reset();
       in_memory.file_first_bit = 0;
     }
+    const std::uint64_t limit =
+        core::HostLevels::least_bytes(in_memory, ISO_MAX_SURFACES, true) + kDecodedBytes;
     auto on_host = std::make_unique<core::HostRenderer>(
-        in_memory, core::HostRendererOptions{.num_threads = 1, .field = &in_memory});
+        in_memory,
+        core::HostRendererOptions{.memory_limit = limit, .num_threads = 1, .field = &in_memory});
     host = on_host.get();
     auto implementation = std::make_unique<Renderer::Implementation>(std::make_shared<Turns>(),
                                                                      volume, std::move(on_host));
@@ -67,26 +87,35 @@ struct Opened {
   Opened(const Opened &) = delete;
   Opened &operator=(const Opened &) = delete;
 
+  /// The chunks of all levels.
+  std::vector<core::BlockChunks *> chunks() const {
+    std::vector<core::BlockChunks *> all;
+    if (in_memory.chunks) all.push_back(in_memory.chunks.get());
+    for (const core::CompressedVolume &level : in_memory.coarser_levels)
+      all.push_back(level.chunks.get());
+    return all;
+  }
+  /// The parts of its file that were missed since the last call.
+  json take_missing() const {
+    json parts = json::array();
+    for (core::BlockChunks *of_level : chunks()) {
+      for (const core::FilePart &part : of_level->take_missing())
+        parts.push_back({part.begin, part.end});
+    }
+    return parts;
+  }
+
   std::shared_ptr<const Volume> volume;
   core::CompressedVolume in_memory;  ///< which rays read from
   core::HostRenderer *host = nullptr;
   std::optional<Renderer> renderer;
+  /// A request that waits for chunks, and what was drawn for it.
+  std::string waiting{};
+  std::uint64_t hits = 0, decoded_blocks = 0, rays_cut = 0;
 };
 
 std::unique_ptr<Opened> opened;
 std::vector<std::uint8_t> bytes;
-
-/// [least, largest] voxel, or if the file does not say, that of a sample.
-std::array<float, 2> range_of(const Volume &volume) {
-  std::array<float, 2> range = volume.value_range();
-  if (std::isfinite(range[0]) && std::isfinite(range[1])) return range;
-  range = {std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity()};
-  for (const float voxel : volume.sample(kSampledVoxels)) {
-    if (!std::isfinite(voxel)) continue;
-    range = {std::min(range[0], voxel), std::max(range[1], voxel)};
-  }
-  return range[0] <= range[1] ? range : std::array{0.0f, 0.0f};
-}
 
 /// Columns: from indices to the world.
 glm::dmat3 axes_of(const Grid &grid) {
@@ -117,6 +146,15 @@ json box_of(const Grid &grid) {
   return {{low.x, low.y, low.z}, {high.x, high.y, high.z}};
 }
 
+/// [least, largest] voxel, about: without a chunk that is not there.
+std::array<float, 2> range_of(const Opened &on) {
+  const std::array<float, 2> range = on.volume->value_range();
+  if (!on.in_memory.chunks || (std::isfinite(range[0]) && std::isfinite(range[1])))
+    return range_or_sampled(*on.volume);
+  const core::MacrocellRanges &ranges = on.in_memory.chunks->ranges();
+  return {*std::ranges::min_element(ranges.low), *std::ranges::max_element(ranges.high)};
+}
+
 json facts() {
   constexpr std::array kTypes = {"uint8", "int8",    "uint16",  "int16",  "uint32",
                                  "int32", "float32", "float64", "uint64", "int64"};
@@ -127,7 +165,8 @@ json facts() {
           {"box", box_of(grid)},
           {"anatomical", grid.is_anatomical},
           {"dtype", kTypes.at(std::size_t(volume.source_type()))},
-          {"range", range_of(volume)},
+          {"range", range_of(*opened)},
+          {"levels", opened->in_memory.coarser_levels.size() + 1},
           {"bits_per_voxel", volume.bits_per_voxel()},
           {"max_error", volume.max_voxel_error() ? json(*volume.max_voxel_error()) : json()},
           {"nbytes", volume.compressed_bytes()},
@@ -136,7 +175,13 @@ json facts() {
 
 json open(const json &request) {
   const std::string path = request.at("path");
-  auto next = std::make_unique<Opened>(path);  // or throws, and the volume before stays
+  const auto found = request.find("chunks");
+  auto volume =
+      found == request.end()
+          ? open_volume(path)
+          : std::make_shared<const Volume>(std::make_unique<const Volume::Implementation>(
+                core::read_chunks_head(read_file(path), *found), std::vector<std::string>{}));
+  auto next = std::make_unique<Opened>(std::move(volume));  // or throws, and the one before stays
   if (request.value("keep", false))
     core::give_zfp_file(next->volume->implementation().volume, "volume.zfp",
                         [](std::span<const std::byte> piece) {
@@ -150,6 +195,20 @@ json open(const json &request) {
 Opened &the_volume() {
   if (!opened) throw core::Error("no volume is open");
   return *opened;
+}
+
+json supply(const json &request) {
+  const std::vector<std::byte> all = read_file(request.at("path"));
+  std::span<const std::byte> left(all);
+  for (const json &part : request.at("parts")) {
+    const std::uint64_t begin = part.at(0), size = part.at(1).get<std::uint64_t>() - begin;
+    if (size > left.size()) throw core::Error("a part of the volume's file is too short");
+    for (core::BlockChunks *of_level : the_volume().chunks()) {
+      if (of_level->has_chunk_at(begin)) of_level->give(begin, left.first(size));
+    }
+    left = left.subspan(size);
+  }
+  return json::object();
 }
 
 ImageSize size_of_request(const json &request) {
@@ -172,8 +231,30 @@ FrameRequest frame_request(const json &request) {
   FrameRequest frame = scene_request(scene);
   frame.size = size_of_request(request);
   frame.ambient_rays = request.value("ambient", 0u);
+  const bool has_labels = std::ranges::any_of(
+      scene.surfaces, [](const Surface &surface) { return !surface.labels.empty(); });
+  if (the_volume().in_memory.chunks && !has_labels)
+    frame.voxel_pixels = request.value("voxel_pixels", 0.0);
   if (!scene.camera) frame.camera = the_volume().renderer->camera(scene.surfaces, frame.size);
   return frame;
+}
+
+/// Draws what is not finished of a request. Returns nothing if chunks are missing.
+std::optional<Frame> render_or_wait(Opened &on, std::string request, const FrameRequest &wanted) {
+  const bool goes_on = request == on.waiting;
+  if (!goes_on) {
+    on.hits = on.decoded_blocks = on.rays_cut = 0;
+    for (core::BlockChunks *of_level : on.chunks()) of_level->drop_unused(kChunkBytes);
+  }
+  on.waiting.clear();
+  on.host->go_on(goes_on);
+  Frame frame = on.renderer->render(wanted);
+  on.hits += frame.statistics.hits;
+  on.decoded_blocks += frame.statistics.decoded_blocks;
+  on.rays_cut += frame.statistics.rays_cut;
+  if (!frame.statistics.cancelled) return frame;
+  on.waiting = std::move(request);
+  return {};
 }
 
 json draw(const json &request) {
@@ -183,7 +264,9 @@ json draw(const json &request) {
   std::array<std::uint32_t, 2> rows{0, wanted.size.height};
   if (const auto found = request.find("rows"); found != request.end() && !as_png) rows = *found;
   on.host->set_rows(rows[0], rows[1]);
-  const Frame frame = on.renderer->render(wanted);
+  const std::optional<Frame> drawn = render_or_wait(on, request.dump(), wanted);
+  if (!drawn) return {};
+  const Frame &frame = *drawn;
   if (as_png) {
     bytes = encode_png(frame);
   } else {
@@ -205,9 +288,9 @@ json draw(const json &request) {
     const std::string text = on.volume->isovalue_notice(surface.isovalue);
     if (!text.empty()) notice += (notice.empty() ? "" : " ") + text;
   }
-  json answer = {{"hits", statistics.hits},
-                 {"decoded_blocks", statistics.decoded_blocks},
-                 {"rays_cut", statistics.rays_cut},
+  json answer = {{"hits", on.hits},
+                 {"decoded_blocks", on.decoded_blocks},
+                 {"rays_cut", on.rays_cut},
                  {"ms", statistics.total_ms},
                  {"notice", notice}};
   if (statistics.field_range) answer["field_range"] = *statistics.field_range;
@@ -230,7 +313,12 @@ std::optional<double> value_at(const Volume &volume, const Vector3 &position) {
     region.begin[std::size_t(i)] = static_cast<std::uint32_t>(begin);
     region.end[std::size_t(i)] = static_cast<std::uint32_t>(begin) + 2;
   }
-  const std::vector<float> cell = volume.decode(0, region);
+  std::vector<float> cell(8);
+  core::decode_region(volume.implementation().volume,
+                      {{region.begin[0], region.begin[1], region.begin[2]},
+                       {region.end[0], region.end[1], region.end[2]},
+                       glm::uvec3(1)},
+                      cell);
   double value = 0;
   for (unsigned corner = 0; corner < 8; ++corner) {
     double weight = 1;
@@ -264,25 +352,19 @@ json probe(const json &request) {
   frame.ambient_rays = frame.appearance.shadow_rays = frame.appearance.bounce_rays = 0;
   frame.want_positions = true;
   on.host->set_rows(0, 1);
+  on.host->go_on(false);
+  on.waiting.clear();
   const Frame drawn = on.renderer->render(frame);
+  if (drawn.statistics.cancelled) return {};
   const Vector3 position = drawn.positions[0];
   if (!std::isfinite(position[0])) return {{"position", nullptr}, {"value", nullptr}};
   const std::optional<double> value = value_at(*on.volume, position);
   return {{"position", position}, {"value", value ? json(*value) : json()}};
 }
 
-json histogram(const json &request) {
-  const Volume &volume = *the_volume().volume;
-  const std::size_t bins = request.at("bins");
-  const std::array<float, 2> range = range_of(volume);
-  std::vector<std::uint64_t> counts(bins);
-  const double width = range[1] > range[0] ? double{range[1]} - double{range[0]} : 1;
-  for (const float voxel : volume.sample(kSampledVoxels)) {
-    const double bin = std::floor((double{voxel} - range[0]) * double(bins) / width);
-    if (std::isfinite(bin))
-      ++counts[static_cast<std::size_t>(std::clamp(bin, 0.0, double(bins - 1)))];
-  }
-  return {{"counts", counts}, {"range", range}, {"suggested", volume.suggested_isovalues()}};
+json histogram() {
+  const VoxelHistogram values = voxel_histogram(*the_volume().volume);
+  return {{"counts", values.counts}, {"range", values.range}, {"suggested", values.suggested}};
 }
 
 json answer_to(const json &request) {
@@ -294,8 +376,21 @@ json answer_to(const json &request) {
   if (what == "camera") return camera(request);
   if (what == "draw") return draw(request);
   if (what == "probe") return probe(request);
-  if (what == "histogram") return histogram(request);
+  if (what == "histogram") return histogram();
+  if (what == "supply") return supply(request);
   throw core::Error("the engine cannot \"{}\"", what);
+}
+
+/// An answer, or the parts of the volume's file that it needs.
+json answer_or_missing(const json &request) {
+  json answer;
+  try {
+    answer = answer_to(request);
+  } catch (const core::ChunkIsMissing &) {
+  }
+  if (!opened) return answer;
+  if (json missing = opened->take_missing(); !missing.empty()) return {{"missing", missing}};
+  return answer;
 }
 
 }  // namespace
@@ -308,7 +403,7 @@ EMSCRIPTEN_KEEPALIVE const char *engine_call(const char *request) {
   bytes.clear();
   try {
     answer = core::guarded("drawing", [&] {
-               return answer_to(json::parse(request));
+               return answer_or_missing(json::parse(request));
              }).dump(-1, ' ', false, json::error_handler_t::replace);
   } catch (const std::exception &error) {
     answer = json{{"error", error.what()}}.dump(-1, ' ', false, json::error_handler_t::replace);

@@ -10,8 +10,8 @@
 const QUARTER = 4;
 const BAND_MS = 40; // that a worker takes for a band, about
 const MOST_WORKERS = 8;
-const MOST_BYTES = 1.5e9; // of all workers' engines, about
-const ENGINE_BYTES = 64e6;
+const MOST_BYTES = 2e9; // of all workers' engines, about
+const ENGINE_BYTES = 192e6; // of one, beside what the volume takes
 /** What a page's engine does not have: elements of the panel and the menus. */
 const NOT_HERE = ["[name=max_error]", "[name=by]", "[name=time_budget]", ".levels",
   "[name=with_bar]", "[name=save_page]", ".budget", "details:has([name=units])"];
@@ -47,6 +47,7 @@ class Crew {
     this.ready = [];
     this.answers = new Map();
     this.asked = 0;
+    this.remote = null; // volume that is not in the page
   }
 
   /** One more, which has no volume yet. */
@@ -76,33 +77,57 @@ class Crew {
   }
 
   /** @returns {Promise<Message>} the engine's answer */
-  ask(worker, request) {
+  ask(worker, request, given = []) {
     const id = ++this.asked;
     return new Promise((resolve, reject) => {
       this.answers.set(id, { resolve, reject, worker });
-      worker.postMessage({ id, ...request });
+      worker.postMessage({ id, ...request }, given);
     });
+  }
+
+  /**
+   * As ask(). What the engine lacks of a volume beside the page, it gets.
+   * @returns {Promise<?Message>} null: isOver() says that no one waits any more
+   */
+  async work(worker, request, isOver = () => false) {
+    for (let took = 0; ;) {
+      const answer = await this.ask(worker, request);
+      took += answer.took;
+      if (!answer.missing) return { ...answer, took };
+      if (isOver()) return null;
+      const bytes = await this.remote.get(answer.missing);
+      if (isOver()) return null;
+      await this.ask(worker, { what: "supply", parts: answer.missing, bytes }, [bytes.buffer]);
+    }
   }
 
   /** What the first worker answers. */
   askFirst(request) {
-    return this.ask(this.workers[0], request);
+    return this.work(this.workers[0], request);
   }
 
   /** Opens a volume: in one worker, which says what it is; the others get it meanwhile.
+   * @param {?RemoteVolume} remote the volume; bytes are the head of its file
    * @returns {Promise<Message>} facts of the volume, as in welcome */
-  async open(name, bytes) {
+  async open(name, bytes, remote = null) {
     if (this.workers.length === 0) await this.add();
-    const keep = !/\.zfp$/i.test(name);
-    const { data, ...facts } = await this.askFirst({ what: "open", name, bytes, keep });
+    const keep = !remote && !/\.zfp$/i.test(name);
+    const chunks = remote?.bytes; // of the whole file
+    const { data, ...facts } = await this.askFirst({ what: "open", name, bytes, keep, chunks });
+    this.remote = remote;
     for (const worker of this.workers.slice(1)) this.end(worker, "The volume is another one.");
     this.ready = [...this.workers];
-    const file = { what: "open", name: "volume.zfp", bytes: data ?? bytes, keep: false };
-    const each = ENGINE_BYTES + 4 * facts.shape.reduce((a, b) => a * b) + 2 * facts.nbytes;
+    const file = { what: "open", name: "volume.zfp", bytes: data ?? bytes, keep: false, chunks };
+    const each = ENGINE_BYTES + facts.memory + (remote ? 0 : 2 * facts.nbytes);
     this.count = clamp(Math.floor(MOST_BYTES / each), 1,
       Math.min(navigator.hardwareConcurrency || 2, MOST_WORKERS));
     for (let i = 1; i < this.count; ++i) this.join(file);
     return facts;
+  }
+
+  /** Counts of values, and isovalues that are worth a look. */
+  histogram() {
+    return this.remote?.values ?? this.askFirst({ what: "histogram" });
   }
 
   /** One more worker with the volume; if it has no memory for that, the others draw all. */
@@ -162,14 +187,15 @@ function fieldsOf(scene) {
   };
 }
 
-/** The stages of a wish's picture, the worst first. */
-function stagesOf(wish) {
-  const quick = { samples: 1, ambient: 0, shadow: null, bounce: 0 };
+/** The stages of a wish's picture, the worst first. coarse: begins with levels of detail. */
+function stagesOf(wish, coarse) {
+  const quick = { samples: 1, ambient: 0, shadow: null, bounce: 0,
+    ...(coarse && { voxel_pixels: 1 }) };
   const small = wish.size.map((side) => Math.ceil(side / QUARTER));
   const hasMore = wish.samples > 1 || wish.ambient || wish.shadow || wish.bounce;
   return [
     { ...wish, ...quick, size: small, stage: "first" },
-    ...(hasMore ? [{ ...wish, ...quick, stage: "sharp" }] : []),
+    ...(hasMore || coarse ? [{ ...wish, ...quick, stage: "sharp" }] : []),
     { ...wish, stage: "lossless" },
   ];
 }
@@ -205,7 +231,14 @@ class LocalScene {
     const field = this.first?.field === "volume" || this.first?.color_by_label
       ? { name: "volume", range: this.facts.range, labels: /int/.test(this.facts.dtype) } : null;
     return { ...this.facts, type: "welcome", version: VERSION, title: this.title, isovalue,
-      scene: this.first, annotations: null, field, steps: null };
+      scene: this.first && this.fitted(this.first), annotations: null, field, steps: null };
+  }
+
+  /** A scene whose camera shows as much of the width in pictures that are narrower than high. */
+  fitted(scene) {
+    const { camera } = scene;
+    return camera ? { ...scene, camera: zoom(camera, 1 / this.narrow()) }
+      : scene;
   }
 
   get status() {
@@ -247,7 +280,7 @@ class LocalScene {
     const begin = performance.now();
     const seen = wish.camera ? wish : { ...wish, camera: await this.camera(wish) };
     this.last = seen;
-    for (const stage of stagesOf(seen)) {
+    for (const stage of stagesOf(seen, this.crew.remote && this.facts.levels > 1)) {
       const picture = await this.drawStage(stage);
       if (!picture) return; // there is a newer wish
       const { bounce, ambient, shadow } = stage;
@@ -270,16 +303,18 @@ class LocalScene {
     const pixels = new Uint8ClampedArray(4 * width * height);
     const facts = { decoded_blocks: 0, rays_cut: 0, notice: "", field_range: null };
     const request = { what: "draw", scene: sceneOf(stage), size: stage.size,
-      samples: stage.samples, ambient: stage.ambient };
+      samples: stage.samples, ambient: stage.ambient, voxel_pixels: stage.voxel_pixels ?? 0 };
     const band = this.bandOf(stage, workers.length);
     let row = 0;
     let failure = null;
-    const isOver = () => failure || row >= height || (this.next && stage.stage !== "first");
+    const isOver = () => failure || (this.next && stage.stage !== "first");
     const draw = async (worker) => {
-      while (!isOver()) {
+      while (row < height && !isOver()) {
         const rows = [row, Math.min(height, row + band)];
         [, row] = rows;
-        const { data, took, ...of } = await this.crew.ask(worker, { ...request, rows });
+        const answer = await this.crew.work(worker, { ...request, rows }, isOver);
+        if (!answer) return;
+        const { data, took, ...of } = answer;
         pixels.set(data, 4 * width * rows[0]);
         facts.decoded_blocks += of.decoded_blocks;
         facts.rays_cut += of.rays_cut;
@@ -328,12 +363,8 @@ class LocalScene {
 
   /** When the first picture is there, which matters more. */
   async showHistogram() {
-    const { range: [low, high], dtype } = this.facts;
-    const values = high - low + 1;
-    const isWhole = /int/.test(dtype) && high > low;
-    const bins = isWhole ? Math.ceil(values / Math.ceil(values / 256)) : 256;
     this.histogram = { type: "histogram" };
-    const { counts, range, suggested } = await this.crew.askFirst({ what: "histogram", bins });
+    const { counts, range, suggested } = await this.crew.histogram();
     this.histogram = { type: "histogram", counts, range, suggested };
     this.hear(this.histogram);
   }
@@ -379,7 +410,7 @@ async function openDropped(view, local, file) {
   view.note(`Opening ${file.name} …`, "passing");
   try {
     const facts = await local.crew.open(file.name, await file.arrayBuffer());
-    const [suggested] = (await local.crew.askFirst({ what: "histogram", bins: 1 })).suggested;
+    const [suggested] = (await local.crew.histogram()).suggested;
     local.use({ ...facts, isovalue: suggested ?? (facts.range[0] + facts.range[1]) / 2 },
       file.name, null);
     Object.assign(view.state, { surfaces: [makeSurface(NaN)], selected: 0, camera: null,
@@ -409,13 +440,25 @@ async function startPage() {
   } catch (error) {
     return say(`The engine of this page does not start: ${error.message}`);
   }
+  const of = text("volume").trim();
   try {
-    const facts = await crew.open("volume.zfp", fromBase64(text("volume")));
+    const facts = of.startsWith("{") ? await openBeside(crew, JSON.parse(of))
+      : await crew.open("volume.zfp", fromBase64(of));
     const { fields } = await crew.askFirst({ what: "scene", text: text("scene") });
     showView(crew, facts, title, fieldsOf(fields));
   } catch (error) {
-    say(`The volume in this page cannot be opened: ${error.message}`);
+    say(`The volume of this page cannot be opened: ${error.message}`);
   }
+}
+
+/** Opens a volume that is a file beside the page. */
+async function openBeside(crew, about) {
+  if (location.protocol === "file:") {
+    throw new Error("it is read from a server. Put the page's folder on one.");
+  }
+  const remote = new RemoteVolume(about);
+  const facts = await crew.open("volume.chunks", await remote.head(), remote);
+  return { ...facts, range: remote.values.range, nbytes: remote.bytes };
 }
 
 function showView(crew, facts, title, scene) {
@@ -424,6 +467,10 @@ function showView(crew, facts, title, scene) {
   let view = null;
   const local = new LocalScene(crew, (head, data) => view.receive(head, data));
   local.use(facts, title, scene);
+  local.narrow = () => {
+    const { width, height } = view.picture.getBoundingClientRect();
+    return width >= 1 && height >= 1 ? Math.min(1, width / height) : 1;
+  };
   view = new View(host, {
     send: (message) => local.send(message), wheel: () => true, hash: true,
     isDark: () => matchMedia(DARK).matches,

@@ -2,7 +2,8 @@
 """make_page.py ENGINE.js ENGINE.wasm VIEWER OUT.html.gz: the page without a volume.
 
 The page has the viewer's front end (folder VIEWER), the engine, and places for what isowave's
-save_page() puts in: @ISOWAVE_TITLE@, @ISOWAVE_POSTER@, @ISOWAVE_SCENE@, @ISOWAVE_VOLUME@.
+save_page() puts in: @ISOWAVE_CONNECT@, @ISOWAVE_TITLE@, @ISOWAVE_POSTER@, @ISOWAVE_SCENE@,
+@ISOWAVE_VOLUME@.
 """
 
 import base64
@@ -13,12 +14,13 @@ import sys
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-HOMES = "homes.js"  # of servers and notebooks; local.js comes in its place
+HOMES = "homes.js"  # of servers and notebooks; these come in its place:
+OWN = ("remote.js", "local.js")
 
 
 def script(viewer: Path) -> str:
     parts = runpy.run_path(str(viewer / "front_end.py"))["PARTS"]
-    files = [viewer / part for part in parts if part != HOMES] + [HERE / "local.js"]
+    files = [viewer / part for part in parts if part != HOMES] + [HERE / name for name in OWN]
     return "\n" + "\n".join(file.read_text(encoding="utf-8") for file in files)
 
 

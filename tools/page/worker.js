@@ -1,6 +1,6 @@
 // worker.js -- a worker of a page: an engine (engine.cpp), which answers requests one by one. In:
-// {id, what, ...}; "start" has the compiled module, "open" a file's name and bytes. Out: {id, data:
-// bytes that belong to the answer, ...answer}.
+// {id, what, ...}; "start" has the compiled module, "open" a file's name and bytes, "supply" bytes of
+// parts. Out: {id, data: bytes that belong to the answer, ...answer}.
 
 let engine = null;
 let folders = 0; // each file has a folder of its own
@@ -26,15 +26,23 @@ function remove(path) {
 
 let shown = null; // path of the volume, whose blocks are read from it
 
-function open({ name, bytes, keep }) {
+function open({ name, bytes, keep, chunks }) {
   const folder = `/${++folders}`;
   engine.FS.mkdir(folder);
   const path = `${folder}/${name.replaceAll("/", "_")}`;
   engine.FS.writeFile(path, new Uint8Array(bytes));
-  const answer = ask({ what: "open", path, keep });
+  const answer = ask({ what: "open", path, keep, chunks });
   remove(answer.error ? path : shown);
   if (!answer.error) shown = path;
   if (answer.error) answer.error = answer.error.replaceAll(path, name);
+  return answer;
+}
+
+function supply({ parts, bytes }) {
+  const path = "/parts";
+  engine.FS.writeFile(path, bytes);
+  const answer = ask({ what: "supply", path, parts });
+  engine.FS.unlink(path);
   return answer;
 }
 
@@ -54,7 +62,7 @@ globalThis.onmessage = async ({ data: { id, ...request } }) => {
   let answer;
   const begin = performance.now();
   try {
-    const act = { start, open }[request.what] ?? ask;
+    const act = { start, open, supply }[request.what] ?? ask;
     answer = await act(request);
   } catch (failure) { // such as memory that is used up
     answer = { error: `the engine failed: ${failure?.message ?? failure}`.split("\n")[0] };

@@ -468,6 +468,15 @@ void add_renderers(nb::module_ &m) {
         isowave::save_page(volume.volume, scene, path, {.engine = engine, .title = title});
       },
       "volume"_a, "scene"_a, "path"_a, "engine"_a, "title"_a);
+  m.def(
+      "save_site",
+      [](const PyVolume &volume, const nb::dict &fields, const std::filesystem::path &folder,
+         const std::filesystem::path &engine, const std::string &title) {
+        const isowave::Scene scene = scene_of(fields);
+        const WithoutGil no_gil;
+        isowave::save_site(volume.volume, scene, folder, {.engine = engine, .title = title});
+      },
+      "volume"_a, "scene"_a, "folder"_a, "engine"_a, "title"_a);
   nb::class_<PassView>(m, "PassView")
       .def_prop_ro("passes", &PassView::passes)
       .def_prop_ro("completed_percent", &PassView::completed_percent)

@@ -1,6 +1,8 @@
 #pragma once
-// Pages that show a volume in any browser, without a server and without a network.
+// Pages that show a volume in any browser: one file, without a server and without a network; or a
+// folder for a server of static files, with a volume of any size.
 
+#include <array>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -28,13 +30,26 @@ struct PageOptions {
 /// scene   its volume is not opened. Without a camera, the surfaces fill the picture
 /// path    ends in .html; the file appears when it is complete
 /// Throws  Error: no engine; a scene with what pages do not show: annotations, a parallel view, a
-///         transparent background, a second volume, tables of colours, surfaces that are not
-///         clipped or mapped, more than eight clipping planes; a volume of more than 350 MiB; the
-///         file cannot be written
+///         second volume, tables of colours, surfaces that are not clipped or mapped, more than
+///         eight clipping planes; a volume of more than 350 MiB; the file cannot be written
 void save_page(const std::shared_ptr<const Volume> &volume, const Scene &scene,
                const std::filesystem::path &path, const PageOptions &options = {});
 /// Throws  Error: what save_page() refuses, whatever the volume is
 void check_page(const Scene &scene, const std::filesystem::path &path,
                 const PageOptions &options = {});
+
+/// Writes a site: a page, index.html, and beside it the volume, volume.chunks, of which the page
+/// reads the parts that rays come to, by HTTP range requests. Any server of static files that
+/// answers these can have the folder. The page draws with the same bits as that of save_page(). Its
+/// first pictures are of coarser levels of detail, which are made if the volume has none.
+///
+/// folder  is made if it is missing. Its two files appear when they are complete
+/// Throws  Error: as save_page(), but a volume may have any size
+void save_site(const std::shared_ptr<const Volume> &volume, const Scene &scene,
+               const std::filesystem::path &folder, const PageOptions &options = {});
+/// Throws  Error: what save_site() refuses, whatever the volume is
+void check_site(const Scene &scene, const PageOptions &options = {});
+/// The files that save_site() writes: page and volume.
+std::array<std::filesystem::path, 2> site_files(const std::filesystem::path &folder);
 
 }  // namespace isowave

@@ -38,6 +38,13 @@ def save_page(
     engine: str | PathLike[str],
     title: str,
 ) -> None: ...
+def save_site(
+    volume: Volume,
+    scene: dict[str, Any],
+    folder: str | PathLike[str],
+    engine: str | PathLike[str],
+    title: str,
+) -> None: ...
 def annotation_layout(
     wanted: dict[str, Any],
     request: dict[str, Any],

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -27,7 +27,7 @@ from isowave._files import (
 )
 from isowave._source_file import SourceFile, text_of_index
 
-COMMANDS = ("info", "convert", "render", "extract", "compare")
+COMMANDS = ("info", "convert", "render", "extract", "export", "compare")
 FIELD = "--color-by"
 """The option that names a second volume, in its own fields between commas."""
 OPTIONS = ("--dataset", "--index", "--field-dataset", "--field-index")
@@ -223,6 +223,7 @@ def with_nrrd(
         for at, text in scene.option(name):
             changed[at] = text
         more = more or ([] if no_data is None else ["--no-data", repr(no_data)])
+    title = next(_names(real.values()), None) if arguments[0] == "export" else None
     left = [text for text in changed if text is not None]
     is_done = {"--index": has_volume, "--field-index": has_field}  # else the program reads the file
     for name in OPTIONS:
@@ -230,7 +231,12 @@ def with_nrrd(
             take_option(left, name)
     if "--save-scene" in says and None in real.values():
         raise Error("--save-scene: a scene names one volume: put the layers' pattern in quotes")
-    return left + ([] if "--no-data" in says else more)
+    left += [] if "--no-data" in says else more
+    return left + ([] if title is None or "--title" in says else ["--title", title])
+
+
+def _names(sources: Iterable[SourceFile | None]) -> Iterator[str]:
+    return (Path(each.path).name for each in sources if each is not None)
 
 
 def as_nrrd(

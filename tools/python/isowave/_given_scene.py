@@ -15,11 +15,12 @@ from isowave._given_files import FIELD, Chosen, Given, as_nrrd, is_there, take_o
 from isowave._source_file import SourceFile, text_of_index
 
 OPTION = "--scene"
+COMMANDS = ("render", "export")
 
 
 @dataclass(frozen=True)
 class GivenScene:
-    """--scene of the program.
+    """--scene of the program, or the scene that `export` has in the volume's place.
 
     at      place of the argument that has its name
     fields  of isowave::Scene
@@ -75,16 +76,18 @@ class GivenScene:
 
 
 def given_scene(arguments: Sequence[str], files: Sequence[Given]) -> GivenScene | None:
-    """The scene of `render`, if packages read a file that it names and the program would open.
+    """The scene of `render` or `export`, if packages read a file that it names and the program would open.
 
     files  given_files(arguments): a volume among them comes in place of the scene's
     """
-    if arguments[:1] != ["render"]:
+    if not arguments or arguments[0] not in COMMANDS:
         return None
     for at, text in enumerate(arguments):
         is_joined = text.startswith(f"{OPTION}=")
         if is_joined or (text == OPTION and at + 1 < len(arguments)):
             at += not is_joined
+            break
+        if arguments[0] == "export" and _is_scene(arguments, at):
             break
     else:
         return None
@@ -103,6 +106,11 @@ def given_scene(arguments: Sequence[str], files: Sequence[Given]) -> GivenScene 
     if not volume and not field:
         return None
     return GivenScene(at, path, fields, volume, field, is_joined)
+
+
+def _is_scene(arguments: Sequence[str], at: int) -> bool:
+    """Whether `export` takes an argument for a scene in the volume's place."""
+    return arguments[at].endswith(".json") and not arguments[at - 1].startswith("-")
 
 
 def _names_volume(arguments: Sequence[str]) -> bool:

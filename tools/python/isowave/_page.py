@@ -1,4 +1,4 @@
-"""Pages that show a volume in any browser, without a server."""
+"""Pages that show a volume in any browser: one file, or a folder for a server of files."""
 
 from __future__ import annotations
 
@@ -14,8 +14,24 @@ def save_page(
     volume: Any, fields: dict[str, Any], path: str | os.PathLike[str], title: str
 ) -> None:
     """Writes a page. fields: those of isowave::Scene. Raises TypeError, Error."""
+    _core.save_page(_core_of(volume), fields, os.fsdecode(path), _engine(), title)
+
+
+def save_site(
+    volume: Any, fields: dict[str, Any], folder: str | os.PathLike[str], title: str
+) -> None:
+    """Writes a page and, beside it, its volume. Arguments and errors as save_page()."""
+    _core.save_site(_core_of(volume), fields, os.fsdecode(folder), _engine(), title)
+
+
+def _core_of(volume: Any) -> _core.Volume:
     core = getattr(volume, "_core", None)
     if not isinstance(core, _core.Volume):
         raise TypeError(f"a page shows a Volume, not {type(volume).__name__}")
+    return core
+
+
+def _engine() -> str:
+    """Its file; empty: the library finds it."""
     is_named = "ISOWAVE_PAGE" in os.environ or not ENGINE.is_file()
-    _core.save_page(core, fields, os.fsdecode(path), "" if is_named else str(ENGINE), title)
+    return "" if is_named else str(ENGINE)

@@ -23,9 +23,9 @@ from isowave.viewer import command
 PROGRAM = _loader.PACKAGE / "bin" / "isowave"
 VIEW = "  view                        Show a volume in a browser: isowave view --help"
 FILES = """
-With pip install 'isowave[files]', info, convert, render, extract, compare and view read TIFF,
-layers in TIFF files (slices_*.tif), folders of DICOM, HDF5, NetCDF, zarr, NPY, NPZ, MRC, VTI, VTK
-and NIfTI-2, too:
+With pip install 'isowave[files]', info, convert, render, extract, export, compare and view read
+TIFF, layers in TIFF files (slices_*.tif), folders of DICOM, HDF5, NetCDF, zarr, NPY, NPZ, MRC, VTI,
+VTK and NIfTI-2, too:
   --dataset NAME              which array of a file that has several, or which level
   --index AXIS=N,...          entries of further axes, counted from 0: t=3,c=0
   --field-dataset NAME        the same of the file that --color-by names

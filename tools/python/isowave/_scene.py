@@ -17,7 +17,7 @@ from isowave._files import Index
 from isowave._handed_on import takes
 from isowave._image import Image
 from isowave._levels import Voxels
-from isowave._page import save_page
+from isowave._page import save_page, save_site
 from isowave._request import (
     FrameArguments,
     Look,
@@ -197,6 +197,27 @@ class Scene:
             written.
         """
         save_page(self.volume, scene_fields(self), path, title)
+
+    def save_site(self, folder: str | os.PathLike[str], *, title: str = "") -> None:
+        """Writes a folder for a server of static files: index.html and, beside it, the volume.
+
+        The page is that of save_html(), but its volume may have any size: the page reads the parts
+        that rays come to, by HTTP range requests, which the server must answer. First pictures are
+        of coarser levels of detail.
+
+        Parameters
+        ----------
+        folder
+            The folder, which is made if it is missing.
+        title
+            The page's title.
+
+        Raises
+        ------
+        Error
+            As save_html(), but for the size.
+        """
+        save_site(self.volume, scene_fields(self), folder, title)
 
     def __repr__(self) -> str:
         shown = [each.text for each in self.surfaces]

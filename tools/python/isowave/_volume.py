@@ -161,6 +161,12 @@ class Volume(Voxels):
         """Writes a page that shows an isosurface in any browser: see Scene.save_html()."""
         self.scene().surface(isovalue).save_html(path, title=title)
 
+    def save_site(
+        self, folder: str | os.PathLike[str], isovalue: Isovalue = "auto", *, title: str = ""
+    ) -> None:
+        """Writes such a page for a server, with a volume of any size: see Scene.save_site()."""
+        self.scene().surface(isovalue).save_site(folder, title=title)
+
     def save_page(self, fields: dict[str, Any], path: str | os.PathLike[str], title: str) -> None:
         """The same of a scene's fields; for the viewer."""
         save_page(self, fields, path, title)
