@@ -76,7 +76,8 @@ std::vector<FilePart> BlockChunks::take_missing() {
 }
 
 bool BlockChunks::has_chunk_at(std::uint64_t begin) const {
-  return std::ranges::binary_search(layout_.begins, begin) && begin != layout_.begins.back();
+  const auto at = std::ranges::lower_bound(layout_.begins, begin);
+  return at != layout_.begins.end() && *at == begin && begin != layout_.begins.back();
 }
 
 void BlockChunks::give(std::uint64_t begin, std::span<const std::byte> bytes) {

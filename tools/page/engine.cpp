@@ -152,7 +152,7 @@ std::array<float, 2> range_of(const Opened &on) {
   if (!on.in_memory.chunks || (std::isfinite(range[0]) && std::isfinite(range[1])))
     return range_or_sampled(*on.volume);
   const core::MacrocellRanges &ranges = on.in_memory.chunks->ranges();
-  return {*std::ranges::min_element(ranges.low), *std::ranges::max_element(ranges.high)};
+  return {std::ranges::min(ranges.low), std::ranges::max(ranges.high)};
 }
 
 json facts() {
