@@ -1,5 +1,6 @@
 #pragma once
-// Large arrays of items of blocks, of which only parts are ever written to, page by page.
+// Large arrays of items of blocks, of which only parts are ever written to, page by page. Places in
+// them have 64 bits, also where addresses have 32.
 
 #include <algorithm>
 #include <array>
@@ -24,12 +25,15 @@ constexpr std::size_t kPageItems = sizeof(T) == sizeof(float) ? 256 : 16;
 template <class T, bool kHasPages = platform::kHasPages>
 struct BlockItems {
   T *items;
-  T &operator[](std::size_t i) const { return items[i]; }
+  T &operator[](std::uint64_t i) const { return items[i]; }
 };
 template <class T>
 struct BlockItems<T, false> {
   T *const *pages;
-  T &operator[](std::size_t i) const { return pages[i / kPageItems<T>][i % kPageItems<T>]; }
+  T &operator[](std::uint64_t i) const {
+    return pages[static_cast<std::size_t>(i / kPageItems<T>)]
+                [static_cast<std::size_t>(i % kPageItems<T>)];
+  }
 };
 
 /// Pages of a system that has none. Pages that were not taken share one, of zeros.
@@ -94,11 +98,11 @@ class BlockPages {
   }
 
   BlockItems<T, kHasPages> items() const { return pages_.items(); }
-  bool is_taken(std::size_t item) const {
+  bool is_taken(std::uint64_t item) const {
     return taken_[page_of(item)].load(std::memory_order_relaxed) != 0;
   }
   /// Takes the page of an item. Returns whether nothing else has.
-  bool take(std::size_t item) {
+  bool take(std::uint64_t item) {
     const std::size_t page = page_of(item);
     if (taken_[page].exchange(1, std::memory_order_relaxed) != 0) return false;
     pages_.take(page);
@@ -117,8 +121,8 @@ class BlockPages {
   static std::uint64_t num_pages(std::uint64_t num_items) {
     return (num_items * sizeof(T) + page_bytes() - 1) / page_bytes();
   }
-  static std::size_t page_of(std::size_t item) {
-    return static_cast<std::size_t>(item * std::uint64_t{sizeof(T)} / page_bytes());
+  static std::size_t page_of(std::uint64_t item) {
+    return static_cast<std::size_t>(item * sizeof(T) / page_bytes());
   }
 
   std::conditional_t<kHasPages, SystemPages<T>, PageTable<T>> pages_;

@@ -358,7 +358,7 @@ void HostBlocks::decode_once(std::size_t block) {
     // Acquires what a thread wrote that was stopped by an exception.
     if (!state.compare_exchange_weak(seen, kBeingMade, std::memory_order_acquire)) continue;
     try {
-      take_page(values_, ISO_BLOCK_VOXELS * block);
+      take_page(values_, std::uint64_t{ISO_BLOCK_VOXELS} * block);
       decode_to(block, values(block));
       seen = HostField::kDecoded;
     } catch (...) {
@@ -419,7 +419,7 @@ void HostBlocks::find_changing(Selection &selection, std::size_t block,
 /// The page of this item will be written to. The page counts before it is marked as taken, so that
 /// none is ever written to without having been counted.
 template <class T>
-void HostBlocks::take_page(BlockPages<T> &pages, std::size_t item) {
+void HostBlocks::take_page(BlockPages<T> &pages, std::uint64_t item) {
   if (pages.is_taken(item)) return;
   room_->take(pages.page_bytes());
   if (!pages.take(item)) room_->give_back(pages.page_bytes());

@@ -162,7 +162,7 @@ class HostBlocks {
   template <class T>
   void release(BlockPages<T> &pages);
   template <class T>
-  void take_page(BlockPages<T> &pages, std::size_t item);
+  void take_page(BlockPages<T> &pages, std::uint64_t item);
   void check_chunks(std::span<const std::size_t> blocks) const;
   void decode_once(std::size_t block);
   void decode_to(std::size_t block, float *values) const;
@@ -188,7 +188,9 @@ class HostBlocks {
   std::size_t block_at(const glm::uvec3 &block) const {
     return block.x + blocks_.x * (block.y + std::size_t{blocks_.y} * block.z);
   }
-  float *values(std::size_t block) const { return &values_.items()[ISO_BLOCK_VOXELS * block]; }
+  float *values(std::size_t block) const {
+    return &values_.items()[std::uint64_t{ISO_BLOCK_VOXELS} * block];
+  }
   /// Item `number` of a grid of at most ISO_MAX_BLOCK_IDS, x first. By 32 bits, which processors
   /// divide faster.
   static glm::uvec3 place_of(std::uint64_t number, const glm::uvec3 &size) {

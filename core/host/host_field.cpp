@@ -25,7 +25,7 @@ float value_at_hit(const FieldMap &map, const FrameParams &grid, const HostField
     const auto x = static_cast<uint>(place.x + (c & 1)),
                y = static_cast<uint>(place.y + (c >> 1 & 1)),
                z = static_cast<uint>(place.z + (c >> 2));
-    const std::size_t block = level_block_at(&grid, x / 4, y / 4, z / 4);
+    const ulong block = level_block_at(&grid, x / 4, y / 4, z / 4);
     corners[c] = decoded.values[ISO_BLOCK_VOXELS * block + x % 4 + 4 * (y % 4) + 16 * (z % 4)];
   }
   return value_of_hit(&map, label_table, hit, corners, place.at);

@@ -56,18 +56,18 @@ inline Mask open_blocks(const PacketField *field, const FrameParams *frame, cons
 /// Blocks lie one behind the other, so a voxel's place is the sum of one term for each coordinate.
 inline Mask load_corners(const PacketField *field, const FrameParams *frame, const Ints *at,
                          Mask lanes, Floats *w) {
-  const std::size_t row = std::size_t{ISO_BLOCK_VOXELS} * frame->grid.blocks_x,
-                    layer = row * frame->grid.blocks_y;
-  const auto place = [](int voxel, std::size_t block, int step) {
-    const auto v = static_cast<std::size_t>(voxel);
-    return (v >> 2) * block + static_cast<std::size_t>(step) * (v & 3);
+  const ulong row = ulong{ISO_BLOCK_VOXELS} * frame->grid.blocks_x,
+              layer = row * frame->grid.blocks_y;
+  const auto place = [](int voxel, ulong block, int step) {
+    const auto v = static_cast<ulong>(voxel);
+    return (v >> 2) * block + static_cast<ulong>(step) * (v & 3);
   };
   for (int corner = 0; corner < 8; ++corner) w[corner] = floats(0);
   ISO_EACH_LANE(lane, lanes) {
     const int x = at[0][lane], y = at[1][lane], z = at[2][lane];
-    const std::size_t xs[2] = {place(x, ISO_BLOCK_VOXELS, 1), place(x + 1, ISO_BLOCK_VOXELS, 1)},
-                      ys[2] = {place(y, row, 4), place(y + 1, row, 4)},
-                      zs[2] = {place(z, layer, 16), place(z + 1, layer, 16)};
+    const ulong xs[2] = {place(x, ISO_BLOCK_VOXELS, 1), place(x + 1, ISO_BLOCK_VOXELS, 1)},
+                ys[2] = {place(y, row, 4), place(y + 1, row, 4)},
+                zs[2] = {place(z, layer, 16), place(z + 1, layer, 16)};
     for (int corner = 0; corner < 8; ++corner)
       w[corner][lane] = field->values[xs[corner & 1] + ys[corner >> 1 & 1] + zs[corner >> 2]];
   }
@@ -100,9 +100,8 @@ inline void sides_in_cells(const PacketField *field, const FrameParams *frame, c
              changing = pick(numbers < 32, low, high) >> (numbers & 31) & 1;
   ISO_EACH_LANE(lane, in_active & (changing == 0)) {
     const BlockCoords b = block_of(lane);
-    const std::size_t block = level_block_at(frame, b.x, b.y, b.z);
-    const float voxel =
-        field->values[ISO_BLOCK_VOXELS * block + static_cast<std::size_t>(numbers[lane])];
+    const ulong block = level_block_at(frame, b.x, b.y, b.z);
+    const float voxel = field->values[ISO_BLOCK_VOXELS * block + static_cast<ulong>(numbers[lane])];
     (*sides)[lane] = voxel - frame->surface.isovalue >= 0.0f ? ISO_SIDE_INSIDE : ISO_SIDE_OUTSIDE;
   }
 }

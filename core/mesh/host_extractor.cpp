@@ -167,7 +167,7 @@ class HostExtractor {
       const uint id = dual_grid_block(&frame_, entry.block, corner);
       if (id != ISO_INVALID_ID)
         result.at(corner) =
-            host_loops().inside(&field_.values[std::size_t{ISO_BLOCK_VOXELS} * id], isovalue_);
+            host_loops().inside(&field_.values[std::uint64_t{ISO_BLOCK_VOXELS} * id], isovalue_);
     }
     return result;
   }
@@ -234,7 +234,7 @@ class HostExtractor {
 
   float voxel(const glm::ivec3 &at) const {
     const glm::uvec3 p(at);
-    return field_.values[std::size_t{ISO_BLOCK_VOXELS} * id_of(p / 4u) + bit_of(p)];
+    return field_.values[std::uint64_t{ISO_BLOCK_VOXELS} * id_of(p / 4u) + bit_of(p)];
   }
 
   /// The differences at a voxel; one-sided at the domain's border.
