@@ -241,7 +241,7 @@ def test_damaged_pages_say_so(
     page.goto((tmp_path / "damaged.html").as_uri())
     line = page.locator("#line")
     until(page, "!/Opening|JavaScript/.test(document.querySelector('#line').innerText)")
-    said = {"volume": "The volume in this page cannot be opened: ", "module": "The engine"}
+    said = {"volume": "The volume of this page cannot be opened: ", "module": "The engine"}
     assert line.inner_text().startswith(said[part]) and "\n" not in line.inner_text().strip()
     assert page.locator("#poster img").is_visible()
 
