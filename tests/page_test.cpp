@@ -196,7 +196,7 @@ TEST_F(CliExport, OneIsovalueOrAScene) {
 TEST_F(CliExport, ASiteHasAPageAndTheVolumeInChunks) {
   const std::string fuel = std::string("export ") + kFuelFile + engine() + " -i 10 --site ";
   std::filesystem::create_directory(folder_ / "there");
-  for (const std::string &name : {"there", "new/site"}) {
+  for (const std::string name : {"there", "new/site"}) {
     const auto done = run_isowave(fuel + in(name));
     ASSERT_EQ(done.status, 0) << done.err;
     EXPECT_THAT(done.out, HasSubstr("volume.chunks: "));
