@@ -1,5 +1,7 @@
 #include "isowave/volume.hpp"
 
+#include <limits>
+
 #include "core/api/convert.hpp"
 #include "core/api/guarded.hpp"
 #include "core/api/volume_implementation.hpp"
@@ -195,7 +197,10 @@ std::vector<float> Volume::decode(std::uint32_t level, const Region &region) con
                                    to_uvec3(region.step)};
     core::check_region(wanted, volume.info.dims);
     const glm::u64vec3 dims(wanted.dims());
-    std::vector<float> voxels(dims.x * dims.y * dims.z);
+    const std::uint64_t count = dims.x * dims.y * dims.z;
+    if (count > std::numeric_limits<std::size_t>::max() / sizeof(float))
+      throw core::Error("{} voxels do not fit this build's addresses: decode fewer", count);
+    std::vector<float> voxels(count);
     core::decode_region(volume, wanted, voxels);
     return voxels;
   });

@@ -133,7 +133,7 @@ class HostBlocks {
   using Changing = BlockPages<ulong>;
 
   /// Dual cells of each block [macrocell][64]: the order of masks. Blocks without such cells:
-  /// ranges that hold nothing. Of a volume in chunks, empty.
+  /// ranges that hold nothing. A volume in chunks has none.
   struct DualRanges {
     std::vector<float> low, high;
   };

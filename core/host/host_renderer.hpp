@@ -58,7 +58,7 @@ class HostRenderer : public Renderer {
   /// Light does not bounce then, since that takes neighbours; a field's range is that of the rows.
   /// A sample of the rays is drawn whole.
   void set_rows(std::uint32_t begin, std::uint32_t end) { rows_ = {begin, end}; }
-  /// Of a volume in chunks: whether the next frame goes on with the last, which has the same
+  /// For a volume in chunks: whether the next frame goes on with the last, which has the same
   /// request and rows, and waited for chunks (FrameStats::cancelled). Tiles that were finished
   /// stay, and do not count in its statistics. Not with FrameRequest::on_pass.
   void go_on(bool goes_on) { goes_on_ = goes_on; }

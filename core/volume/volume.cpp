@@ -72,8 +72,11 @@ void check_volume_info(const VolumeInfo &info, std::string_view what) {
                   info.dims.z, kMaxDim);
     }
   }
-  // Sizes of memory are computed from this count, in std::size_t.
-  constexpr std::uint64_t kMaxVoxels = std::numeric_limits<std::size_t>::max() / 8;
+  // Sizes of memory are computed from this count, in std::size_t. Where addresses have 32 bits, a
+  // volume may stay in parts: what holds all voxels refuses it.
+  constexpr std::uint64_t kMaxVoxels = sizeof(std::size_t) < sizeof(std::uint64_t)
+                                           ? std::uint64_t{1} << 36
+                                           : std::numeric_limits<std::size_t>::max() / 8;
   if (const std::uint64_t voxels = info.num_voxels(); voxels > kMaxVoxels) {
     throw Error("{}: {} voxels: this build, whose addresses have {} bits, takes at most {}", what,
                 voxels, 8 * sizeof(std::size_t), kMaxVoxels);

@@ -24,8 +24,8 @@ struct ChunkFileSize {
 ChunkFileSize write_chunks(std::span<const CompressedVolume *const> levels,
                            std::span<const MacrocellRanges> ranges, AtomicFile &file);
 
-/// The volume of a file with this head, with all levels. Of its payload nothing is there yet: the
-/// `chunks` of each level get it.
+/// The volume of a file with this head, with all levels. Its payload is not there yet: the `chunks`
+/// of each level get it.
 ///
 /// num_bytes  of the whole file
 /// Throws     Error: it is no such head

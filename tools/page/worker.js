@@ -1,6 +1,6 @@
 // worker.js -- a worker of a page: an engine (engine.cpp), which answers requests one by one. In:
-// {id, what, ...}; "start" has the compiled module, "open" a file's name and bytes, "supply" bytes of
-// parts. Out: {id, data: bytes that belong to the answer, ...answer}.
+// {id, what, ...}; "start" has the compiled module, "open" a file's name and bytes, "supply"
+// bytes of parts. Out: {id, data: bytes that belong to the answer, ...answer}.
 
 let engine = null;
 let folders = 0; // each file has a folder of its own

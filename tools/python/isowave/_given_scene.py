@@ -76,7 +76,7 @@ class GivenScene:
 
 
 def given_scene(arguments: Sequence[str], files: Sequence[Given]) -> GivenScene | None:
-    """The scene of `render` or `export`, if packages read a file that it names and the program would open.
+    """The scene of `render` or `export`, if packages read a file of it that the program would open.
 
     files  given_files(arguments): a volume among them comes in place of the scene's
     """
