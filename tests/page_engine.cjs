@@ -1,12 +1,13 @@
 // page_engine.cjs ENGINE.js WORKER.js VOLUME SCENE.json OUT.png [plain]: runs a page's worker under
 // node, as the page does; `plain`: as in a browser without relaxed vectors. Writes the picture of
-// 96 x 54 pixels and two ambient rays; bands of rows, which other workers draw, must be parts of it.
-// What the engine refuses is an error of one line.
+// 96 x 54 pixels and two ambient rays; bands of rows, which other workers draw, must be parts of
+// it. What the engine refuses is an error of one line.
 const assert = require("node:assert");
 const fs = require("node:fs");
 const zlib = require("node:zlib");
 
 const [glue, code, volume, sceneFile, out, plain] = process.argv.slice(2);
+globalThis.self = { location: { href: "" } }; // as in a worker
 globalThis.createEngine = require(fs.realpathSync(glue));
 const binary = fs.readFileSync(glue.replace(/js$/, "wasm"));
 

@@ -92,6 +92,9 @@ inline Floats fabs(Floats x) {
   return as_floats(as_ints(x) & 0x7FFFFFFF);
 }
 
+/// Lane i in bit i.
+inline unsigned bits_of(Mask mask);
+
 /// Gives lanes the halves of each one's 64-bit number. numbers: below 2^31.
 inline void gather_halves(const ulong *from, Ints numbers, Mask lanes, Ints *low, Ints *high) {
   ISO_EACH_LANE(lane, lanes) {

@@ -314,9 +314,8 @@ ISO_OF_ITS_OWN ISO_WHOLE_LOOP bool trace_ray_behind_anywhere(std::span<const Hos
   return trace_ray_behind<trace_ray_anywhere, trace_ray_in_cell_anywhere, trace_block_anywhere,
                           side_anywhere>(surface, ray_id, hit, next);
 }
-ISO_WHOLE_LOOP uint blend_rays_anywhere(std::span<const LeveledSurface> surfaces,
-                                        const LayerBlend &by, const RayTile &tile, HitRecord *next,
-                                        const LayersOfRays &to) {
+uint blend_rays_anywhere(std::span<const LeveledSurface> surfaces, const LayerBlend &by,
+                         const RayTile &tile, HitRecord *next, const LayersOfRays &to) {
   return blend<trace_rays_behind<trace_ray_behind_anywhere>, smooth_hit_anywhere,
                trace_ray_anywhere, side_anywhere>(surfaces, by, tile, next, to);
 }
@@ -353,14 +352,6 @@ uint trace_levels_narrow(std::span<const HostLevel> levels, const RayTile &tile,
                          HitRecord *hits) {
   return smoothed<smooth_anywhere>(trace_levels<kTraceBand, side_anywhere>(levels, tile, hits),
                                    levels, tile, is_smooth, hits);
-}
-template <auto kTraceBand, auto kTraceBehind>
-uint blend_narrow(std::span<const LeveledSurface> surfaces, const LayerBlend &by,
-                  const RayTile &tile, HitRecord *next, const LayersOfRays &to) {
-  return blend<trace_packets_behind<trace_ray_in_cell_anywhere, kTraceBehind, kTraceBand,
-                                    side_anywhere>,
-               smooth_hit_anywhere, trace_ray_anywhere, side_anywhere>(surfaces, by, tile, next,
-                                                                       to);
 }
 #endif
 
@@ -457,6 +448,14 @@ ISO_WIDE_LOOP void shade_layers_wide(const FrameParams &frame, const ShadeParams
   shade_layers(frame, params, samples, row, colors, picture);
 }
 
+uint blend_sse4(std::span<const LeveledSurface> surfaces, const LayerBlend &by, const RayTile &tile,
+                HitRecord *next, const LayersOfRays &to) {
+  return blend<trace_packets_behind<trace_ray_in_cell_anywhere, trace_packet_behind_sse4,
+                                    trace_band_packet_sse4, side_anywhere>,
+               smooth_hit_anywhere, trace_ray_anywhere, side_anywhere>(surfaces, by, tile, next,
+                                                                       to);
+}
+
 /// With fused multiply-add, single rays are faster.
 bool is_narrow() {
   return __builtin_cpu_supports("sse4.1") && __builtin_cpu_supports("popcnt") &&
@@ -479,9 +478,8 @@ constexpr HostLoops kLoops[] = {
     {decode_anywhere, ranges_anywhere, inside_anywhere, trace_narrow<trace_packets_sse4>,
      trace_rays<trace_rays_of_levels_anywhere>, trace_levels_narrow<trace_band_packet_sse4>,
      trace_rays_of_levels_anywhere, cast_anywhere, ambient_anywhere, place_hits_anywhere,
-     filter_bounced_anywhere, shade_anywhere,
-     blend_narrow<trace_band_packet_sse4, trace_packet_behind_sse4>, blend_rays_anywhere,
-     blend_lit_anywhere, shade_layers_anywhere},
+     filter_bounced_anywhere, shade_anywhere, blend_sse4, blend_rays_anywhere, blend_lit_anywhere,
+     shade_layers_anywhere},
     {decode_wide, ranges_wide, inside_wide, trace_wide, trace_rays<trace_rays_of_levels_wide>,
      trace_levels_wide, trace_rays_of_levels_wide, cast_wide, ambient_wide, place_hits_wide,
      filter_bounced_wide, shade_wide, blend_wide, blend_rays_wide, blend_lit_wide,
@@ -490,8 +488,8 @@ constexpr HostLoops kLoops[] = {
     {decode_anywhere, ranges_anywhere, inside_anywhere, trace_narrow<trace_packets>,
      trace_rays<trace_rays_of_levels_anywhere>, trace_levels_narrow<trace_band_packet>,
      trace_rays_of_levels_anywhere, cast_anywhere, ambient_anywhere, place_hits_anywhere,
-     filter_bounced_anywhere, shade_anywhere, blend_narrow<trace_band_packet, trace_packet_behind>,
-     blend_rays_anywhere, blend_lit_anywhere, shade_layers_anywhere},
+     filter_bounced_anywhere, shade_anywhere, blend_rays_anywhere, blend_rays_anywhere,
+     blend_lit_anywhere, shade_layers_anywhere},  // pages are small: no packets behind hits
 #endif
 };
 

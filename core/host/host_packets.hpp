@@ -40,6 +40,7 @@ struct BandSides {
 uint trace_band_packet(const HostLevel &level, uint x, uint y, uint lanes, HitRecord *hits,
                        bool by_lane, BandSides *sides);
 
+#ifdef __x86_64__
 /// Traces some of eight rays on from their hits on a surface, in the level of detail that has the
 /// hits, to their next cell with a crossing.
 ///
@@ -50,7 +51,6 @@ uint trace_band_packet(const HostLevel &level, uint x, uint y, uint lanes, HitRe
 void trace_packet_behind(const HostLevel &surface, uint x, uint y, uint lanes, uint capped,
                          const HitRecord *hits, HitRecord *next);
 
-#ifdef __x86_64__
 /// The same, for processors with sse4.1 and popcnt.
 uint trace_packets_sse4(const FrameParams &frame, const HostField &field, const RayTile &tile,
                         HitRecord *hits);

@@ -17,10 +17,6 @@ uint trace_band_packet(const HostLevel &level, uint x, uint y, uint lanes, HitRe
                        bool by_lane, BandSides *sides) {
   return packets_wasm::trace_band(level, x, y, lanes, hits, by_lane, sides);
 }
-void trace_packet_behind(const HostLevel &surface, uint x, uint y, uint lanes, uint capped,
-                         const HitRecord *hits, HitRecord *next) {
-  packets_wasm::trace_behind(surface, x, y, lanes, capped, hits, next);
-}
 
 }  // namespace isowave::core
 #endif

@@ -77,7 +77,7 @@ class FixedRateCoder : public LevelCoder {
   std::span<const float> decoded() const override { return decoded_; }
 
  private:
-  // Of libzfp's functions, those of blocks: the others bring code for all types and dimensions.
+  // libzfp's functions for whole arrays would bring code for all types and dimensions.
   void encode_block(zfp_stream &stream, const BlockRow &row, std::uint32_t x) const {
     const float *voxels = row.voxels + x;
     const std::uint32_t nx = std::min(dims_.x - x, 4u);

@@ -11,7 +11,7 @@ inline float fma_by_wasm(float a, float b, float c) {
   return __builtin_wasm_fma_f32x4(Four{a, a, a, a}, Four{b, b, b, b}, Four{c, c, c, c})[0];
 }
 
-/// Is it the instruction? What replaces it computes a * b + c for both signs of f32x4.relaxed_nmadd.
+/// Is it the instruction? What replaces it computes a * b + c, for f32x4.relaxed_nmadd, too.
 inline bool fma_is_fused() {
   using Four = float __attribute__((vector_size(16)));
   volatile float one = 1.0f; /* so that no compiler computes the rest */

@@ -44,11 +44,8 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
-// <>: not put into kernels
-#if defined(__wasm_relaxed_simd__)
-#include <kernels_cl/portable/fma_by_wasm.h>
-#elif !defined(__GLIBC__) && !defined(__FP_FAST_FMAF)
-#include <kernels_cl/portable/fma_by_double.h>
+#if !defined(__GLIBC__) && !defined(__FP_FAST_FMAF)
+#include <kernels_cl/portable/fma_by_double.h>  // <>: not put into kernels
 #endif
 #define ISO_CHECK_SIZE(T, n) static_assert(sizeof(T) == (n), #T " layout changed")
 #define ISO_NAMESPACE_BEGIN namespace isowave::core {
@@ -73,10 +70,6 @@ using std::floor;
 #ifdef ISOWAVE_FMA_BY_DOUBLE_H
 inline float fma(float a, float b, float c) {
   return fma_by_double(a, b, c);
-}
-#elif defined(ISOWAVE_FMA_BY_WASM_H)
-inline float fma(float a, float b, float c) {
-  return fma_by_wasm(a, b, c);
 }
 #else
 using std::fma;

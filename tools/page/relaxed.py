@@ -71,7 +71,7 @@ def to_leb(number: int, least_bytes: int = 1) -> bytes:
 
 
 def sections(module: bytes) -> Iterator[tuple[int, int, int, int]]:
-    """Of each section: its number, where it begins, where its content begins and ends."""
+    """Number, begin, and begin and end of the content of each section."""
     at = 8
     while at < len(module):
         size, content = leb(module, at + 1)
