@@ -49,9 +49,9 @@ same_bits() { # same_bits VOLUME ISOVALUE
 }
 # A page's worker draws the picture, too: whole, and in bands of rows; with the browser's own
 # multiply-add, and with what takes its place.
-same_picture() { # same_picture VOLUME ISOVALUE
+same_picture() { # same_picture VOLUME OPTION...
   local volume=$source/tests/data/$1
-  quietly "$program" render "$volume" -i "$2" --size 96x54 --ambient 2 -o "$work/native.png" \
+  quietly "$program" render "$volume" "${@:2}" --size 96x54 --ambient 2 -o "$work/native.png" \
     --save-scene "$work/scene.json"
   for plain in '' plain; do
     quietly "${node[@]}" "$source/tests/page_engine.cjs" "$build/library/tools/page/engine.js" \
@@ -59,7 +59,8 @@ same_picture() { # same_picture VOLUME ISOVALUE
     cmp "$work/engine.png" "$work/native.png" || fail "$1: the engine's picture is another"
   done
 }
-same_picture fuel_64x33x32_uint8.raw.gz 10
+same_picture fuel_64x33x32_uint8.raw.gz -i 10
+same_picture fuel_64x33x32_uint8.raw.gz --surface 10,skin,0.4 --surface 90,blood
 
 same_bits fuel_64x33x32_uint8.raw.gz 10
 same_bits head_41x41x41_uint8.raw.gz 90
