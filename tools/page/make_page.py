@@ -15,7 +15,7 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 HOMES = "homes.js"  # of servers and notebooks; these come in its place:
-OWN = ("remote.js", "local.js")
+OWN = ("relaxed.js", "remote.js", "local.js")
 
 
 def script(viewer: Path) -> str:
