@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 
 #include "core/base/error.hpp"
+#include "core/platform/process.hpp"
 #include "tools/isowave/commands.hpp"
 #include "tools/isowave/mpi_team.hpp"
 #include "tools/isowave/program.hpp"
@@ -57,5 +58,8 @@ int run(int argc, char **argv) {
 }  // namespace
 
 int main(int argc, char **argv) {
-  return isowave::core::tools::run_main([&] { return run(argc, argv); });
+  return isowave::core::tools::run_main([&] {
+    isowave::core::platform::make_utf8(argc, argv);
+    return run(argc, argv);
+  });
 }
