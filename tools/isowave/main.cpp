@@ -26,6 +26,7 @@ int run(int argc, char **argv) {
       "Isosurfaces of zfp-compressed volumes, drawn by speculative progressive raycasting on "
       "OpenCL devices."};
   app.name("isowave");
+  app.allow_windows_style_options(false);  // "/volume.nrrd" is a file
   app.set_version_flag("--version", program_name());
   app.require_subcommand(1);
   add_devices(app);
