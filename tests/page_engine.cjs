@@ -1,17 +1,21 @@
-// page_engine.cjs ENGINE.js WORKER.js VOLUME SCENE.json OUT.png: runs a page's worker under node,
-// as the page does. Writes the picture of 96 x 54 pixels and two ambient rays; bands of rows, which
-// other workers draw, must be parts of it. What the engine refuses is an error of one line.
+// page_engine.cjs ENGINE.js WORKER.js VOLUME SCENE.json OUT.png [plain]: runs a page's worker under
+// node, as the page does; `plain`: as in a browser without relaxed vectors. Writes the picture of
+// 96 x 54 pixels and two ambient rays; bands of rows, which other workers draw, must be parts of
+// it. What the engine refuses is an error of one line.
 const assert = require("node:assert");
 const fs = require("node:fs");
 const zlib = require("node:zlib");
 
-const [glue, code, volume, sceneFile, out] = process.argv.slice(2);
+const [glue, code, volume, sceneFile, out, plain] = process.argv.slice(2);
+globalThis.self = { location: { href: "" } }; // as in a worker
 globalThis.createEngine = require(fs.realpathSync(glue));
+const binary = fs.readFileSync(glue.replace(/js$/, "wasm"));
 
 const SIZE = [96, 54];
 const answers = new Map();
 globalThis.postMessage = ({ id, ...answer }) => answers.get(id)(answer);
-(0, eval)(fs.readFileSync(code, "utf8")); // as a script of the worker
+for (const script of [code.replace("worker.js", "relaxed.js"), code])
+  (0, eval)(fs.readFileSync(script, "utf8")); // as scripts of page and worker
 
 let asked = 0;
 const ask = (request) => new Promise((answer) => {
@@ -47,8 +51,10 @@ function pixelsOf(png, [width, height]) {
 }
 
 async function main() {
-  const binary = fs.readFileSync(glue.replace(/js$/, "wasm"));
-  const module = await WebAssembly.compile(binary);
+  if (plain) WebAssembly.validate = () => false;
+  const fit = await fitted(Uint8Array.from(binary).buffer);
+  assert.equal(binary.equals(fit), !plain, "relaxed vectors");
+  const module = await WebAssembly.compile(fit);
   assert.deepEqual(Object.keys(await ask({ what: "start", module })), ["took"]);
   const isError = ({ error }) => assert.match(error, /^[^\n]+$/);
   const scene = JSON.parse(fs.readFileSync(sceneFile, "utf8"));

@@ -1,9 +1,12 @@
 #!/usr/bin/env bash
-# python_test.sh <source folder> <build folder> <program>: the Python package as users install it.
+# python_test.sh <source folder> <build folder> <program> <test>...: the Python package as users
+# install it, without the tests that are named.
 # Makes a wheel and installs it into a virtual environment, with what its tests need from PyPI;
 # types, stubs, the package's tests; and where nothing of OpenCL is installed.
 set -euo pipefail
 source=$1 build=$2 program=$3
+shift 3
+long=("${@/#/--ignore=}")
 work=$build/python_test
 tests=$source/tools/python/tests
 
@@ -41,7 +44,8 @@ quietly "$python" -m pip install --quiet --force-reinstall --no-deps "$wheel"
 "$python" -m mypy --config-file "$source/pyproject.toml" --cache-dir "$work/mypy" \
   "$source/tools/python/isowave"
 cd "$work"  # not among the sources, whose folder has no compiled part
-ISOWAVE_PROGRAM=$program "$python" -m pytest -q -p no:cacheprovider --durations 40 "$tests"
+ISOWAVE_PROGRAM=$program "$python" -m pytest -q -p no:cacheprovider --durations 40 \
+  "${long[@]}" "$tests"
 
 # On a machine without any OpenCL: PoCL comes from PyPI, the loader with the wheel.
 if ! unshare --mount true 2> /dev/null; then

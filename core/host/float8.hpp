@@ -4,10 +4,12 @@
 // processor, and define before
 //
 //   ISO_PACKET_NAMESPACE  in which all of it is, since each kind has functions of its own
-//   ISO_PACKET_SSE4       where there are registers of four, and no fused multiply-add; elsewhere,
+//   ISO_PACKET_SSE4       on x86-64, for registers of four, without fused multiply-add; elsewhere,
 //                         AVX2 and fused multiply-add
 
+#ifdef __x86_64__
 #include <immintrin.h>
+#endif
 
 #include <bit>
 #include <cstdint>
@@ -41,7 +43,9 @@ inline unsigned first_lane(unsigned bits) {
 
 }  // namespace isowave::core::ISO_PACKET_NAMESPACE
 
-#ifdef ISO_PACKET_SSE4
+#if defined(__wasm__)
+#include "core/host/float8_wasm.hpp"
+#elif defined(ISO_PACKET_SSE4)
 #include "core/host/float8_sse4.hpp"
 #else
 #include "core/host/float8_avx2.hpp"

@@ -24,6 +24,11 @@ inline Ints to_ints(Floats x) {
   return __builtin_convertvector(x, Ints);
 }
 
+/// 1 << n, of n from 0 to 31.
+inline Ints bit_at(Ints n) {
+  return ints(1) << n;
+}
+
 inline Floats fabs(Floats x) {
   return reinterpret_cast<Floats>(reinterpret_cast<Ints>(x) & 0x7FFFFFFF);
 }

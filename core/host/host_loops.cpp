@@ -314,9 +314,8 @@ ISO_OF_ITS_OWN ISO_WHOLE_LOOP bool trace_ray_behind_anywhere(std::span<const Hos
   return trace_ray_behind<trace_ray_anywhere, trace_ray_in_cell_anywhere, trace_block_anywhere,
                           side_anywhere>(surface, ray_id, hit, next);
 }
-ISO_WHOLE_LOOP uint blend_rays_anywhere(std::span<const LeveledSurface> surfaces,
-                                        const LayerBlend &by, const RayTile &tile, HitRecord *next,
-                                        const LayersOfRays &to) {
+uint blend_rays_anywhere(std::span<const LeveledSurface> surfaces, const LayerBlend &by,
+                         const RayTile &tile, HitRecord *next, const LayersOfRays &to) {
   return blend<trace_rays_behind<trace_ray_behind_anywhere>, smooth_hit_anywhere,
                trace_ray_anywhere, side_anywhere>(surfaces, by, tile, next, to);
 }
@@ -338,6 +337,23 @@ uint trace_rays(const FrameParams &frame, const HostField &field, const RayTile 
   const HostLevel level{frame, field};
   return kTraceLevels({&level, 1}, tile, is_smooth, hits);
 }
+
+#ifdef ISO_HAS_PACKETS
+// Packets in registers of four, among loops for any processor.
+template <auto kTracePackets>
+uint trace_narrow(const FrameParams &frame, const HostField &field, const RayTile &tile,
+                  bool is_smooth, HitRecord *hits) {
+  const HostLevel level{frame, field};
+  return smoothed<smooth_anywhere>(kTracePackets(frame, field, tile, hits), {&level, 1}, tile,
+                                   is_smooth, hits);
+}
+template <auto kTraceBand>
+uint trace_levels_narrow(std::span<const HostLevel> levels, const RayTile &tile, bool is_smooth,
+                         HitRecord *hits) {
+  return smoothed<smooth_anywhere>(trace_levels<kTraceBand, side_anywhere>(levels, tile, hits),
+                                   levels, tile, is_smooth, hits);
+}
+#endif
 
 #ifdef ISO_HAS_WIDE_LOOPS
 ISO_WIDE_LOOP void decode_wide(const EncodedBlock &block, float *values) {
@@ -432,18 +448,6 @@ ISO_WIDE_LOOP void shade_layers_wide(const FrameParams &frame, const ShadeParams
   shade_layers(frame, params, samples, row, colors, picture);
 }
 
-uint trace_sse4(const FrameParams &frame, const HostField &field, const RayTile &tile,
-                bool is_smooth, HitRecord *hits) {
-  const HostLevel level{frame, field};
-  return smoothed<smooth_anywhere>(trace_packets_sse4(frame, field, tile, hits), {&level, 1}, tile,
-                                   is_smooth, hits);
-}
-uint trace_levels_sse4(std::span<const HostLevel> levels, const RayTile &tile, bool is_smooth,
-                       HitRecord *hits) {
-  return smoothed<smooth_anywhere>(
-      trace_levels<trace_band_packet_sse4, side_anywhere>(levels, tile, hits), levels, tile,
-      is_smooth, hits);
-}
 uint blend_sse4(std::span<const LeveledSurface> surfaces, const LayerBlend &by, const RayTile &tile,
                 HitRecord *next, const LayersOfRays &to) {
   return blend<trace_packets_behind<trace_ray_in_cell_anywhere, trace_packet_behind_sse4,
@@ -471,14 +475,21 @@ constexpr HostLoops kLoops[] = {
      filter_bounced_anywhere, shade_anywhere, blend_rays_anywhere, blend_rays_anywhere,
      blend_lit_anywhere, shade_layers_anywhere},
 #ifdef ISO_HAS_WIDE_LOOPS
-    {decode_anywhere, ranges_anywhere, inside_anywhere, trace_sse4,
-     trace_rays<trace_rays_of_levels_anywhere>, trace_levels_sse4, trace_rays_of_levels_anywhere,
-     cast_anywhere, ambient_anywhere, place_hits_anywhere, filter_bounced_anywhere, shade_anywhere,
-     blend_sse4, blend_rays_anywhere, blend_lit_anywhere, shade_layers_anywhere},
+    {decode_anywhere, ranges_anywhere, inside_anywhere, trace_narrow<trace_packets_sse4>,
+     trace_rays<trace_rays_of_levels_anywhere>, trace_levels_narrow<trace_band_packet_sse4>,
+     trace_rays_of_levels_anywhere, cast_anywhere, ambient_anywhere, place_hits_anywhere,
+     filter_bounced_anywhere, shade_anywhere, blend_sse4, blend_rays_anywhere, blend_lit_anywhere,
+     shade_layers_anywhere},
     {decode_wide, ranges_wide, inside_wide, trace_wide, trace_rays<trace_rays_of_levels_wide>,
      trace_levels_wide, trace_rays_of_levels_wide, cast_wide, ambient_wide, place_hits_wide,
      filter_bounced_wide, shade_wide, blend_wide, blend_rays_wide, blend_lit_wide,
      shade_layers_wide},
+#elif defined(ISO_HAS_PACKETS)
+    {decode_anywhere, ranges_anywhere, inside_anywhere, trace_narrow<trace_packets>,
+     trace_rays<trace_rays_of_levels_anywhere>, trace_levels_narrow<trace_band_packet>,
+     trace_rays_of_levels_anywhere, cast_anywhere, ambient_anywhere, place_hits_anywhere,
+     filter_bounced_anywhere, shade_anywhere, blend_rays_anywhere, blend_rays_anywhere,
+     blend_lit_anywhere, shade_layers_anywhere},  // pages are small: no packets behind hits
 #endif
 };
 
@@ -487,6 +498,9 @@ constexpr HostLoops kLoops[] = {
 std::span<const HostLoops> all_host_loops() {
 #ifdef ISO_HAS_WIDE_LOOPS
   static const std::size_t count = is_wide() ? 3 : is_narrow() ? 2 : 1;
+  return std::span(kLoops).first(count);
+#elif defined(ISO_HAS_PACKETS)
+  static const std::size_t count = fma_is_fused() ? 2 : 1;
   return std::span(kLoops).first(count);
 #else
   return kLoops;

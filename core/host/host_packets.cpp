@@ -2,7 +2,7 @@
 #define ISO_LEVELS 1
 #include "core/host/host_packets.hpp"
 
-#ifdef ISO_HAS_PACKETS
+#ifdef __x86_64__
 #include <immintrin.h>
 
 #include <algorithm>

@@ -1,17 +1,17 @@
 #pragma once
-// Rays of a frame in packets of eight, for processors with AVX2, or with SSE4.1 alone. Without
-// fused multiply-add, both packets and single rays compute it by other means, packets for four at a
-// time.
+// Rays of a frame in packets of eight, for processors with AVX2, or with SSE4.1 alone, and for
+// WebAssembly's relaxed vectors. Without fused multiply-add, both packets and single rays compute
+// it by other means, packets for four at a time.
 
 #include "core/host/host_loops.hpp"
 
-#if defined(__x86_64__)
+#if defined(__x86_64__) || defined(__wasm_relaxed_simd__)
 #define ISO_HAS_PACKETS 1
 
 namespace isowave::core {
 
 /// As HostLoops::trace(), with cells' gradients. For processors with avx2, bmi, bmi2, fma and
-/// popcnt.
+/// popcnt; in WebAssembly, for engines that fuse multiply-adds.
 uint trace_packets(const FrameParams &frame, const HostField &field, const RayTile &tile,
                    HitRecord *hits);
 
@@ -40,6 +40,7 @@ struct BandSides {
 uint trace_band_packet(const HostLevel &level, uint x, uint y, uint lanes, HitRecord *hits,
                        bool by_lane, BandSides *sides);
 
+#ifdef __x86_64__
 /// Traces some of eight rays on from their hits on a surface, in the level of detail that has the
 /// hits, to their next cell with a crossing.
 ///
@@ -57,6 +58,7 @@ uint trace_band_packet_sse4(const HostLevel &level, uint x, uint y, uint lanes, 
                             bool by_lane, BandSides *sides);
 void trace_packet_behind_sse4(const HostLevel &surface, uint x, uint y, uint lanes, uint capped,
                               const HitRecord *hits, HitRecord *next);
+#endif
 
 }  // namespace isowave::core
 #endif

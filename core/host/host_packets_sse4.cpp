@@ -3,7 +3,7 @@
 // host_packets.cpp for processors with SSE4.1 alone.
 #include "core/host/host_packets.hpp"
 
-#ifdef ISO_HAS_PACKETS
+#ifdef __x86_64__
 #include <immintrin.h>
 
 #include <algorithm>

@@ -84,7 +84,7 @@ inline void sides_in_cells(const PacketField *field, const FrameParams *frame, c
   Ints low = ints(0), high = ints(0);
   open_blocks(field, frame, blocks, in_active, &low, &high);
   const Ints numbers = (at[0] & 3) + 4 * (at[1] & 3) + 16 * (at[2] & 3),
-             changing = pick(numbers < 32, low, high) >> (numbers & 31) & 1;
+             changing = pick(numbers < 32, low, high) & bit_at(numbers & 31);
   ISO_EACH_LANE(lane, in_active & (changing == 0)) {
     const BlockCoords b = block_of(lane);
     const std::size_t block = level_block_at(frame, b.x, b.y, b.z);
@@ -110,7 +110,7 @@ inline Ints rows_from(uint y) {
   return static_cast<int>(y) + Ints{0, 0, 0, 0, 1, 1, 1, 1};
 }
 inline Mask lanes_of(uint bits) {
-  return -(static_cast<int>(bits) >> Ints{0, 1, 2, 3, 4, 5, 6, 7} & 1);
+  return (static_cast<int>(bits) & Ints{1, 2, 4, 8, 16, 32, 64, 128}) != 0;
 }
 
 inline void make_packet_rays(const FrameParams &frame, Ints column, Ints row, PacketRays *rays) {
@@ -212,7 +212,7 @@ inline void begin_at_cells(Packet *p, const PacketScene *scene, const Ints *at, 
   Ints block[3];
   blocks_at(p, block);
   open_blocks(scene->field, scene->frame, block, lanes, &cells->low, &cells->high);
-  const Ints bit = ints(1) << (cells->place & 31);
+  const Ints bit = bit_at(cells->place & 31);
   cells->low &= pick(cells->place < 32, ~bit, ints(-1));
   cells->high &= pick(cells->place < 32, ints(-1), ~bit);
   p->rays.entered.axis = ints(0); /* lanes leave the cells before this is asked for */

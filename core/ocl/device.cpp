@@ -208,10 +208,14 @@ std::uint32_t Device::max_resident_groups() const {
   // work-item that strides over many elements gets there; one element each does not.
   if (info_.name.find("llvmpipe") != std::string::npos) return 1u << 20;
   // A GPU's compute unit holds up to 2048 work-items and hides memory latency behind them: 16
-  // groups of 64 to 128. A CPU driver runs the groups of a unit one after the other; a few per unit
-  // even out groups of unequal work.
-  const std::uint32_t groups_per_unit = info_.type == DeviceType::kGpu ? 16 : 4;
-  return std::max(1u, info_.capabilities.compute_units * groups_per_unit);
+  // groups of 64 to 128.
+  const std::uint32_t units = info_.capabilities.compute_units;
+  if (info_.type == DeviceType::kGpu) return std::max(1u, 16 * units);
+  // A CPU driver runs the groups of a unit one after the other; a few per unit even out groups of
+  // unequal work. It runs the work-items of a group one after the other, too: the fewer there are
+  // in all, the more memory each strides through, before the next one reads beside it. With 8
+  // groups on two cores a picture of 1280x720 took 1.6 times as long as with 64.
+  return std::max(64u, 4 * units);
 }
 
 void Device::finish() {

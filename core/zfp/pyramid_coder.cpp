@@ -39,23 +39,15 @@ class FixedRateCoder : public LevelCoder {
     const ZfpStream stream = make_zfp_stream(64 * options_.rate);
     const ZfpBits bits(or_bad_alloc(stream_open(words.data(), words.size_bytes())), &stream_close);
     zfp_stream_set_bit_stream(stream.get(), bits.get());
-    const ZfpField field(or_bad_alloc(zfp_field_3d(const_cast<float *>(row.voxels), zfp_type_float,
-                                                   dims_.x, row.ny, row.nz)),
-                         &zfp_field_free);
-    zfp_field_set_stride_3d(field.get(), 1, std::ptrdiff_t(dims_.x), layer_size());
-    if (zfp_compress(stream.get(), field.get()) != words.size_bytes()) {
+    for (std::uint32_t x = 0; x < dims_.x; x += 4) encode_block(*stream, row, x);
+    stream_flush(bits.get());
+    if (stream_size(bits.get()) != words.size_bytes())
       throw std::logic_error("zfp: a row of blocks has not its fixed size");
-    }
     if (!options_.measure_error) return;
 
     float *decoded = decoded_.data() + (row.voxels - chunk_.data());
-    const ZfpField copy(
-        or_bad_alloc(zfp_field_3d(decoded, zfp_type_float, dims_.x, row.ny, row.nz)),
-        &zfp_field_free);
-    zfp_field_set_stride_3d(copy.get(), 1, std::ptrdiff_t(dims_.x), layer_size());
     zfp_stream_rewind(stream.get());
-    if (zfp_decompress(stream.get(), copy.get()) == 0)
-      throw std::logic_error("zfp: cannot decode its own blocks");
+    for (std::uint32_t x = 0; x < dims_.x; x += 4) decode_block(*stream, row, x, decoded + x);
     BlockError *errors = errors_.some().data() + row.index * blocks_x();
     for (std::uint32_t z = 0; z < row.nz; ++z) {
       for (std::uint32_t y = 0; y < row.ny; ++y) {
@@ -85,6 +77,27 @@ class FixedRateCoder : public LevelCoder {
   std::span<const float> decoded() const override { return decoded_; }
 
  private:
+  // libzfp's functions for whole arrays would bring code for all types and dimensions.
+  void encode_block(zfp_stream &stream, const BlockRow &row, std::uint32_t x) const {
+    const float *voxels = row.voxels + x;
+    const std::uint32_t nx = std::min(dims_.x - x, 4u);
+    if (nx == 4 && row.ny == 4 && row.nz == 4) {
+      zfp_encode_block_strided_float_3(&stream, voxels, 1, dims_.x, layer_size());
+    } else {
+      zfp_encode_partial_block_strided_float_3(&stream, voxels, nx, row.ny, row.nz, 1, dims_.x,
+                                               layer_size());
+    }
+  }
+  void decode_block(zfp_stream &stream, const BlockRow &row, std::uint32_t x, float *voxels) const {
+    const std::uint32_t nx = std::min(dims_.x - x, 4u);
+    if (nx == 4 && row.ny == 4 && row.nz == 4) {
+      zfp_decode_block_strided_float_3(&stream, voxels, 1, dims_.x, layer_size());
+    } else {
+      zfp_decode_partial_block_strided_float_3(&stream, voxels, nx, row.ny, row.nz, 1, dims_.x,
+                                               layer_size());
+    }
+  }
+
   std::uint32_t blocks_x() const { return (dims_.x + 3u) / 4u; }
   std::uint64_t row_words() const { return std::uint64_t{blocks_x()} * options_.rate; }
   std::ptrdiff_t layer_size() const { return std::ptrdiff_t(dims_.x) * dims_.y; }

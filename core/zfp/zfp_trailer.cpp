@@ -165,7 +165,7 @@ std::string zfp_trailer_text(const CompressedVolume &volume, const ZfpLayout &la
 
 ZfpLayout apply_zfp_trailer(const std::string &text, CompressedVolume &volume) {
   try {
-    return apply_json(json::parse(text), volume);
+    return apply_json(json::parse(std::string_view(text)), volume);
   } catch (const json::exception &) {  // its own words are for programmers
     throw Error("it is not JSON, or a field is missing or of another kind");
   }

@@ -36,6 +36,9 @@ typedef int8 Mask;  ///< -1 or 0 in each lane
 typedef float FloatRegister __attribute__((__vector_size__(32)));
 #endif
 
+/// 1 << n, of n from 0 to 31.
+#define bit_at(n) ((int8)(1) << (n))
+
 /// The nearest whole numbers, of two the even one.
 ISO_INLINE Floats to_nearest(Floats x) {
 #if defined(__AVX__) /* else drivers may take twenty instructions */

@@ -12,6 +12,10 @@
 #include <cmath>
 #include <cstdint>
 
+#ifdef __wasm_relaxed_simd__
+#include "fma_by_wasm.h"
+#endif
+
 namespace isowave::core {
 
 /// product + addend, rounded to odd: of the two neighbours of an inexact sum, the one whose last
@@ -26,8 +30,11 @@ namespace isowave::core {
   return std::bit_cast<double>((error > 0.0) == (sum > 0.0) ? bits + 1 : bits - 1);
 }
 
-/// a * b + c, rounded once.
+/// a * b + c, rounded once. Modules for browsers with an instruction call that.
 inline float fma_by_double(float a, float b, float c) {
+#ifdef __wasm_relaxed_simd__
+  return fma_by_wasm(a, b, c);
+#else
   constexpr std::uint64_t kLeftOut = (std::uint64_t{1} << 29) - 1,  // bits that float32 has not
       kMiddle = std::uint64_t{1} << 28;
   const double product = static_cast<double>(a) * b, sum = product + c;
@@ -36,6 +43,7 @@ inline float fma_by_double(float a, float b, float c) {
   if (is_middle || has_fewer_bits) [[unlikely]]
     return static_cast<float>(sum_to_odd(product, c, sum));
   return static_cast<float>(sum);
+#endif
 }
 
 }  // namespace isowave::core

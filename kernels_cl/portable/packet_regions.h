@@ -119,8 +119,9 @@ ISO_INLINE void blocks_at(const Packet *p, Ints *at) {
 
 /// Lanes whose region is to be entered.
 ISO_INLINE Mask is_wanted(const PacketLevel *level) {
-  const Ints bits = pick(level->place < 32, level->low, level->high);
-  return -((bits >> (level->place & 31)) & 1);
+  const Ints bits = pick(level->place < 32, level->low, level->high),
+             bit = bit_at(level->place & 31);
+  return (bits & bit) == bit;
 }
 
 /// A packet with the rays p->rays.axis, none of which walks yet.

@@ -19,7 +19,7 @@ ISO_PACKET_NAMESPACE_BEGIN
 
 /// Bits first to last, each of 0 to 3.
 ISO_INLINE Ints bits_between(Ints first, Ints last) {
-  return (ints(2) << last) - (ints(1) << first);
+  return 2 * bit_at(last) - bit_at(first);
 }
 
 /// Lets lanes enter the regions of a level within their region of the next larger level, except

@@ -404,8 +404,8 @@ async function startPage() {
   const { title } = document;
   let crew;
   try {
-    crew = new Crew(await WebAssembly.compile(await unzip(fromBase64(text("module")))),
-      text("code"));
+    const module = await fitted(await unzip(fromBase64(text("module"))));
+    crew = new Crew(await WebAssembly.compile(module), text("code"));
   } catch (error) {
     return say(`The engine of this page does not start: ${error.message}`);
   }

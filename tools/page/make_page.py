@@ -18,7 +18,8 @@ HOMES = "homes.js"  # of servers and notebooks; local.js comes in its place
 
 def script(viewer: Path) -> str:
     parts = runpy.run_path(str(viewer / "front_end.py"))["PARTS"]
-    files = [viewer / part for part in parts if part != HOMES] + [HERE / "local.js"]
+    files = [viewer / part for part in parts if part != HOMES]
+    files += [HERE / "relaxed.js", HERE / "local.js"]
     return "\n" + "\n".join(file.read_text(encoding="utf-8") for file in files)
 
 
