@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/glm.hpp>
+#include <numbers>
 
 #include "kernels_cl/portable/grid_dda.h"
 
@@ -76,7 +77,7 @@ std::vector<Camera> cameras_beside(const Camera &camera, std::uint32_t height, d
   std::vector<Camera> cameras{camera};
   for (const double by : {pixels, pixels / 2}) {
     for (int i = 0; i < kDirections; ++i) {
-      const double angle = 2 * M_PI / kDirections * i;
+      const double angle = 2 * std::numbers::pi / kDirections * i;
       cameras.push_back(aside(camera, by * glm::dvec2(std::cos(angle), std::sin(angle)), height));
     }
   }

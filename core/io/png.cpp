@@ -15,6 +15,7 @@
 #include "core/base/error.hpp"
 #include "core/io/atomic_file.hpp"
 #include "core/io/input_file.hpp"
+#include "core/platform/file.hpp"
 
 namespace isowave::core {
 namespace {
@@ -190,7 +191,7 @@ std::optional<std::string> cameras_of_png(const std::filesystem::path &path) {
 Image8 read_png(const std::filesystem::path &path) {
   const std::string where = path.string();
   check_input_file(path);
-  const std::unique_ptr<std::FILE, int (*)(std::FILE *)> file(std::fopen(where.c_str(), "rb"),
+  const std::unique_ptr<std::FILE, int (*)(std::FILE *)> file(platform::open_stream(path),
                                                               &std::fclose);
   if (!file) throw Error("{}: cannot open", where);
   {  // A broken header may ask for any size. So nothing is asked for before the file has shown that

@@ -11,6 +11,7 @@
 #include "core/base/parallel_for.hpp"
 #include "core/base/text.hpp"
 #include "core/ocl/driver_environment.hpp"
+#include "core/platform/loaded_code.hpp"
 #include "core/platform/memory.hpp"
 
 namespace isowave::core::ocl {
@@ -158,6 +159,7 @@ std::vector<ListedDevice> enumerate() {
   if (!has_room_for_driver()) return {};
   begin_threads();  // of drivers
   std::vector<cl::Platform> platforms;
+  if (!platform::has_opencl()) return {};
   prepare_for_drivers();  // before a driver is loaded
   try {
     cl::Platform::get(&platforms);

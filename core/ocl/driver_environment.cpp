@@ -190,7 +190,8 @@ KernelFolder choose_folder(std::size_t index) {
     const bool is_safe = check.danger.empty();
     if (is_safe && (!is_pocl || is_usable(check.path))) {
       // The folder that was checked, whatever the working folder will be.
-      if (check.path != *wanted) platform::set_environment(driver.variable, check.path.c_str());
+      if (check.path != *wanted)
+        platform::set_environment(driver.variable, check.path.string().c_str());
       return result;
     }
     reason = is_safe ? fmt::format("PoCL cannot write to {}", wanted->string())
@@ -206,7 +207,7 @@ KernelFolder choose_folder(std::size_t index) {
   if (other.empty())
     platform::set_environment(driver.off, driver.value_of_off);
   else
-    platform::set_environment(driver.variable, other.c_str());
+    platform::set_environment(driver.variable, other.string().c_str());
   if (is_named) {
     result.refusal =
         fmt::format("{}: set {} to a folder that only you can write to", reason, driver.variable);
@@ -238,6 +239,8 @@ void complete_path() {
 }  // namespace
 
 void prepare_for_drivers() {
+  // Drivers of Windows keep kernels in folders of the user's own, and run no linker.
+  if constexpr (fs::path::preferred_separator != '/') return;
   static std::once_flag once;
   std::call_once(once, [] {
     complete_path();

@@ -2,7 +2,6 @@
 
 #include <fcntl.h>
 #include <spawn.h>
-#include <sys/mman.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -15,6 +14,7 @@
 #include <string_view>
 #include <utility>
 
+#include "core/platform/channel.hpp"
 #include "core/platform/last_failure.hpp"
 #include "core/platform/new_file.hpp"
 
@@ -49,10 +49,9 @@ fs::path find_program(const std::string &name) {
 
 ChildProcess::ChildProcess(const fs::path &program, const std::vector<std::string> &arguments,
                            std::error_code &failure) {
-  // A socket, since writing to a pipe without a reader would end this process by a signal.
   std::array<int, 2> ends{-1, -1};
-  errors_ = ::memfd_create("isowave_errors", MFD_CLOEXEC);
-  if (errors_ < 0 || ::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) != 0) {
+  errors_ = make_scratch();
+  if (errors_ < 0 || !make_channel(ends)) {
     failure = last_failure();
     return;
   }
@@ -70,7 +69,7 @@ ChildProcess::ChildProcess(const fs::path &program, const std::vector<std::strin
   ::posix_spawn_file_actions_addopen(&files, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
   ::posix_spawn_file_actions_adddup2(&files, errors_, STDERR_FILENO);
   pid_t id = -1;
-  const int error = ::posix_spawn(&id, name.c_str(), &files, nullptr, argv.data(), environ);
+  const int error = ::posix_spawn(&id, name.c_str(), &files, nullptr, argv.data(), all_variables());
   ::posix_spawn_file_actions_destroy(&files);
   ::close(ends[1]);
   failure = {error, std::generic_category()};
@@ -89,7 +88,7 @@ ChildProcess::~ChildProcess() {
 void ChildProcess::write(std::span<const std::byte> bytes, std::error_code &failure) {
   failure.clear();
   while (!bytes.empty()) {
-    const ssize_t count = ::send(input_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+    const std::ptrdiff_t count = write_to_channel(input_, bytes);
     if (count >= 0) {
       bytes = bytes.subspan(static_cast<std::size_t>(count));
     } else if (errno != EINTR) {

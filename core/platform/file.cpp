@@ -95,6 +95,10 @@ void File::append(std::span<const std::byte> bytes, std::error_code &failure) {
   }
 }
 
+std::FILE *open_stream(const std::filesystem::path &path) {
+  return std::fopen(path.c_str(), "rb");
+}
+
 std::filesystem::path keep_in_temporary_folder(std::string_view begin, std::string_view text) {
   std::error_code failure;
   std::string name = (std::filesystem::temp_directory_path(failure) / begin).string() + "_XXXXXX";

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstdio>
 #include <filesystem>
 #include <span>
 #include <string_view>
@@ -39,6 +40,9 @@ class File {
 
   std::intptr_t handle_ = -1;  ///< -1: none
 };
+
+/// Opens a file for reading as a stream; nullptr if it cannot.
+std::FILE *open_stream(const std::filesystem::path &path);
 
 /// Makes a file of a new name in the folder for temporary files, which only this user can read.
 ///

@@ -4,28 +4,16 @@
 #include <fmt/format.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
-#ifdef __linux__
-#include <sys/xattr.h>
-#endif
 #include <unistd.h>
 
-#include <array>
-
 #include "core/platform/last_failure.hpp"
+#include "core/platform/stream_of.hpp"
 
 namespace isowave::core::platform {
 
 namespace fs = std::filesystem;
 
 namespace {
-
-/// Returns nullptr, and closes the descriptor, if there is no memory for a stream.
-std::FILE *stream_of(int descriptor, std::error_code &failure) {
-  std::FILE *const stream = descriptor < 0 ? nullptr : ::fdopen(descriptor, "w+b");
-  failure = stream == nullptr ? last_failure() : std::error_code();
-  if (stream == nullptr && descriptor >= 0) ::close(descriptor);
-  return stream;
-}
 
 bool has_access(const fs::path &path, int rights, std::error_code &failure) {
   failure = ::access(path.c_str(), rights) == 0 ? std::error_code() : last_failure();
@@ -34,31 +22,11 @@ bool has_access(const fs::path &path, int rights, std::error_code &failure) {
 
 }  // namespace
 
-std::FILE *make_nameless(const fs::path &folder) {
-#ifdef O_TMPFILE
-  // give_name() names the file through /proc.
-  std::error_code failure;
-  if (has_access("/proc/self/fd", X_OK, failure))
-    return stream_of(::open(folder.c_str(), O_RDWR | O_TMPFILE | O_CLOEXEC, 0666), failure);
-#endif
-  return nullptr;
-}
-
 std::FILE *make_new(const fs::path &path, std::error_code &failure) {
   const int descriptor = ::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
   std::FILE *const stream = stream_of(descriptor, failure);
   if (stream == nullptr && descriptor >= 0) ::unlink(path.c_str());
   return stream;
-}
-
-void give_name(std::FILE *nameless, const fs::path &path, std::error_code &failure) {
-  const fs::path self = name_while_open(nameless);
-  const int result = ::linkat(AT_FDCWD, self.c_str(), AT_FDCWD, path.c_str(), AT_SYMLINK_FOLLOW);
-  failure = result == 0 ? std::error_code() : last_failure();
-}
-
-fs::path name_while_open(std::FILE *file) {
-  return fmt::format("/proc/{}/fd/{}", ::getpid(), ::fileno(file));
 }
 
 void keep_permissions(const fs::path &replaced, std::FILE *file) {
@@ -73,14 +41,8 @@ void keep_permissions(const fs::path &replaced, std::FILE *file) {
     mode &= ~static_cast<mode_t>(S_IRWXG);  // they would be the rights of another group
   // Only root can give a file away: an ordinary user becomes the owner.
   if (old.st_uid != made.st_uid && ::fchown(descriptor, old.st_uid, kSameGroup) != 0) errno = 0;
-#ifdef __linux__
   // Before the mode, which then also limits what the list grants.
-  constexpr const char *kAccessList = "system.posix_acl_access";
-  std::array<char, 1 << 12> list{};
-  const ssize_t length = ::getxattr(replaced.c_str(), kAccessList, list.data(), list.size());
-  if (length > 0)
-    ::fsetxattr(descriptor, kAccessList, list.data(), static_cast<std::size_t>(length), 0);
-#endif
+  copy_access_list(replaced, file);
   ::fchmod(descriptor, mode);
 }
 

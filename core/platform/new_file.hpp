@@ -28,6 +28,8 @@ std::filesystem::path name_while_open(std::FILE *file);
 /// Gives a new file the mode of the file that it will replace, and its owner, group and access list
 /// as far as this user may. Does nothing if there is no such file.
 void keep_permissions(const std::filesystem::path &replaced, std::FILE *file);
+/// Part of keep_permissions(): the list of users and groups with rights of their own.
+void copy_access_list(const std::filesystem::path &replaced, std::FILE *file);
 
 /// Bytes that have come to the file: not those that wait in the stream.
 std::uint64_t size_of(std::FILE *file);

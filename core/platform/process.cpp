@@ -27,10 +27,7 @@ std::optional<std::filesystem::path> home_by_list() {
   return entry.pw_dir;
 }
 
-std::filesystem::path own_program() {
-  std::error_code failure;
-  return std::filesystem::read_symlink("/proc/self/exe", failure);
-}
+void make_utf8(int &, char **&) {}
 
 void set_environment(const char *name, const char *value) {
   ::setenv(name, value, 1);

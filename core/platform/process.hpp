@@ -16,6 +16,9 @@ std::optional<std::filesystem::path> home_by_list();
 
 /// The file of the program that this process runs; empty if the system does not say.
 std::filesystem::path own_program();
+/// Has the arguments of main() in UTF-8. Windows gives main() others; elsewhere they stay as they
+/// are.
+void make_utf8(int &argc, char **&argv);
 
 void set_environment(const char *name, const char *value);
 void unset_environment(const char *name);

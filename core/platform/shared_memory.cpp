@@ -6,8 +6,9 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <fstream>
 #include <utility>
+
+#include "core/platform/provide_memory.hpp"
 
 namespace isowave::core::platform {
 
@@ -31,7 +32,7 @@ SharedMemory SharedMemory::make(std::size_t bytes) {
     file = ::shm_open(memory.name_.c_str(), O_CREAT | O_EXCL | O_RDWR, 0600);
   } while (file < 0 && errno == EEXIST);
   if (file < 0) return memory;
-  if (::posix_fallocate(file, 0, static_cast<off_t>(bytes)) != 0) {
+  if (!provide_memory(file, bytes)) {
     ::close(file);
   } else {
     memory.data_ = map_and_close(file, bytes);
@@ -68,12 +69,6 @@ SharedMemory &SharedMemory::operator=(SharedMemory &&other) noexcept {
 
 void SharedMemory::remove_name() {
   ::shm_unlink(name_.c_str());
-}
-
-std::string system_identity() {
-  std::string identity;
-  std::ifstream("/proc/sys/kernel/random/boot_id") >> identity;
-  return identity;
 }
 
 }  // namespace isowave::core::platform

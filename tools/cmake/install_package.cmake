@@ -30,7 +30,9 @@ if(ISOWAVE_BUILD_PROGRAM)
     install(FILES ${wasm}/install/share/isowave/page.html.gz
             DESTINATION ${CMAKE_INSTALL_DATADIR}/isowave COMPONENT program OPTIONAL)
   endforeach()
-  # The program writes its manual page and completion scripts.
+endif()
+# The program writes its manual page and completion scripts, if it runs where it is built.
+if(ISOWAVE_BUILD_PROGRAM AND NOT CMAKE_CROSSCOMPILING)
   set(shell_files ${PROJECT_BINARY_DIR}/isowave.1)
   set(commands COMMAND isowave man > ${PROJECT_BINARY_DIR}/isowave.1)
   foreach(shell bash zsh fish)

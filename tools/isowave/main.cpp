@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 
 #include "core/base/error.hpp"
+#include "core/platform/process.hpp"
 #include "tools/isowave/commands.hpp"
 #include "tools/isowave/mpi_team.hpp"
 #include "tools/isowave/program.hpp"
@@ -25,6 +26,7 @@ int run(int argc, char **argv) {
       "Isosurfaces of zfp-compressed volumes, drawn by speculative progressive raycasting on "
       "OpenCL devices."};
   app.name("isowave");
+  app.allow_windows_style_options(false);  // "/volume.nrrd" is a file
   app.set_version_flag("--version", program_name());
   app.require_subcommand(1);
   add_devices(app);
@@ -57,5 +59,8 @@ int run(int argc, char **argv) {
 }  // namespace
 
 int main(int argc, char **argv) {
-  return isowave::core::tools::run_main([&] { return run(argc, argv); });
+  return isowave::core::tools::run_main([&] {
+    isowave::core::platform::make_utf8(argc, argv);
+    return run(argc, argv);
+  });
 }

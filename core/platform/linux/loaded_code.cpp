@@ -54,4 +54,8 @@ void give_back_code(bool (*is_meant)(std::string_view path)) {
   ::dl_iterate_phdr(give_back_pages, &is_meant);
 }
 
+bool has_opencl() {
+  return true;
+}
+
 }  // namespace isowave::core::platform
