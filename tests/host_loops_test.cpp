@@ -73,7 +73,7 @@ TEST(HostLoops, AllGiveTheSameBits) {
                     volume.compressed.block_bits(id), volume.compressed.precision.min_exponent, 1,
                     0, 4, 4, 4, 0},
                    values);
-      ASSERT_EQ(std::memcmp(values, blocks.field().values + 64 * id, sizeof(values)), 0) << id;
+      ASSERT_EQ(std::memcmp(values, &blocks.field().values[64 * id], sizeof(values)), 0) << id;
       EXPECT_EQ(loops.inside(values, 10), host_loops().inside(values, 10));
     }
     EXPECT_GT(num_compared, 100u);
