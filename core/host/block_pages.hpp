@@ -1,6 +1,6 @@
 #pragma once
-// Large arrays of items of blocks, of which only parts are ever written to, page by page. Places in
-// them have 64 bits, also where addresses have 32.
+// Large arrays with items of blocks. Only parts are ever written to, page by page. Places in an
+// array have 64 bits, even if addresses have 32.
 
 #include <algorithm>
 #include <array>

@@ -38,8 +38,8 @@ void save_page(const std::shared_ptr<const Volume> &volume, const Scene &scene,
 void check_page(const Scene &scene, const std::filesystem::path &path,
                 const PageOptions &options = {});
 
-/// Writes a site: a page, index.html, and beside it the volume, volume.chunks, of which the page
-/// reads the parts that rays come to, by HTTP range requests. Any server of static files that
+/// Writes a site, which is two files: a page, index.html, and the volume, volume.chunks. The page
+/// reads the parts of the volume that rays come to, by HTTP range requests. Any server of static files that
 /// answers these can have the folder. The page draws with the same bits as that of save_page(). Its
 /// first pictures are of coarser levels of detail, which are made if the volume has none.
 ///
