@@ -39,9 +39,10 @@ void check_page(const Scene &scene, const std::filesystem::path &path,
                 const PageOptions &options = {});
 
 /// Writes a site, which is two files: a page, index.html, and the volume, volume.chunks. The page
-/// reads the parts of the volume that rays come to, by HTTP range requests. Any server of static files that
-/// answers these can have the folder. The page draws with the same bits as that of save_page(). Its
-/// first pictures are of coarser levels of detail, which are made if the volume has none.
+/// reads the parts of the volume that rays come to, by HTTP range requests. Any server of static
+/// files that answers these can have the folder. The page draws with the same bits as that of
+/// save_page(). Its first pictures are of coarser levels of detail, which are made if the volume
+/// has none.
 ///
 /// folder  is made if it is missing. Its two files appear when they are complete
 /// Throws  Error: as save_page(), but a volume may have any size
