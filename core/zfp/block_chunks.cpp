@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <span>
 #include <utility>
 
 #include "core/base/error.hpp"
@@ -70,6 +71,7 @@ std::vector<FilePart> BlockChunks::take_missing() {
   missing_.clear();
   std::ranges::sort(places);
   std::vector<FilePart> parts;
+  parts.reserve(places.size());
   for (const std::uint32_t place : places)
     parts.push_back({layout_.begins[place], layout_.begins[place + 1]});
   return parts;
@@ -109,7 +111,8 @@ BlockChunks::Chunk BlockChunks::unpack(std::uint32_t macrocell,
   Chunk chunk;
   chunk.first_bits.assign(1, 0);
   std::vector<std::uint16_t> lengths(is_indexed ? count : 0);
-  std::memcpy(lengths.data(), bytes.data(), lengths.size() * sizeof(std::uint16_t));
+  const std::span length_bytes = bytes.first(lengths.size() * sizeof(std::uint16_t));
+  std::ranges::copy(length_bytes, std::as_writable_bytes(std::span(lengths)).begin());
   for (std::uint32_t i = 0; i < count; ++i) {
     const std::uint32_t length = is_indexed ? lengths[i] : layout_.bits_per_block;
     if (length > std::max(ISO_MAX_BLOCK_BITS, layout_.bits_per_block)) refuse_chunk();
@@ -117,14 +120,14 @@ BlockChunks::Chunk BlockChunks::unpack(std::uint32_t macrocell,
   }
   if (layout_.has_gaps) {
     chunk.no_data.resize(count);
-    std::memcpy(chunk.no_data.data(), bytes.data() + lengths.size() * sizeof(std::uint16_t),
-                count * sizeof(std::uint64_t));
+    const std::span gaps = bytes.subspan(length_bytes.size(), count * sizeof(std::uint64_t));
+    std::ranges::copy(gaps, std::as_writable_bytes(std::span(chunk.no_data)).begin());
   }
   const std::span payload = bytes.subspan(head);
   const std::uint64_t bits = chunk.first_bits.back();
   if (payload.size() != bytes_of_bits(bits)) refuse_chunk();
   chunk.words.resize((bits + 31) / 32 + kDecoderAhead);
-  std::memcpy(chunk.words.data(), payload.data(), payload.size());
+  std::ranges::copy(payload, std::as_writable_bytes(std::span(chunk.words)).begin());
   return chunk;
 }
 

@@ -8,6 +8,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <numeric>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -74,7 +75,8 @@ class LevelChunks {
       words.resize((of_row + 63) / 64 * 2);
       wide.resize(words.size() / 2);
       level_.read_words(begin, words);
-      std::memcpy(wide.data(), words.data(), words.size() * sizeof(std::uint32_t));
+      std::ranges::copy(std::as_bytes(std::span(words)),
+                        std::as_writable_bytes(std::span(wide)).begin());
       bits.append(wide, of_row);
       num_bits += of_row;
     });
@@ -186,8 +188,9 @@ std::vector<std::byte> unpacked(std::span<const std::byte> packed, std::uint64_t
 
 template <class T>
 std::span<const std::byte> take_items(std::span<const std::byte> bytes, std::vector<T> &items) {
-  std::memcpy(items.data(), bytes.data(), items.size() * sizeof(T));
-  return bytes.subspan(items.size() * sizeof(T));
+  const std::span into = std::as_writable_bytes(std::span(items));
+  std::ranges::copy(bytes.first(into.size()), into.begin());
+  return bytes.subspan(into.size());
 }
 
 /// Gives a level its chunks.
