@@ -109,8 +109,8 @@ class BrickRenderer(Placed[_core.Renderer]):
     levels
         Frames may use the levels of detail that are in the .zfp file.
     bounds
-        Frames may ask for `max_error` and bounds. If the volume is compressed here, its error is
-        then measured.
+        Frames may ask for `max_surface_error` and bounds. If the volume is compressed here, its
+        error is then measured.
     field
         File of a second volume for `ColorMap(by="field")`, which may be `path`. Each process keeps
         what its brick needs of it. A file that is not compressed is compressed like the volume.
@@ -245,9 +245,9 @@ class BrickRenderer(Placed[_core.Renderer]):
     ) -> Image | None:
         """Draws a frame; arguments as Renderer.render(), without positions and time_budget.
 
-        `max_error` by proof and the output "bounds" need bounds=True. One Renderer would choose the
-        same detail, and find the same bounds. All processes give an `on_pass`, or none. That of
-        rank 0 is called, with the picture of the whole volume, and may stop the frame.
+        `max_surface_error` by proof and the output "bounds" need bounds=True. One Renderer would
+        choose the same detail, and find the same bounds. All processes give an `on_pass`, or none.
+        That of rank 0 is called, with the picture of the whole volume, and may stop the frame.
 
         Returns
         -------

@@ -171,7 +171,7 @@ class Renderer:
         Number of decoded blocks of 4^3 voxels that a device keeps, 8 and more. 0: as many as the
         budget allows, or without a budget as many as frames need.
     levels, bounds, time_budget, rays
-        Whether frames may use levels of detail; ask for `max_error` and bounds; have a
+        Whether frames may use levels of detail; ask for `max_surface_error` and bounds; have a
         `time_budget`; have `ambient` rays, and cast_rays() may be called. On the host they may.
     bounce
         The same as rays, and frames may have `bounce_rays`. On the host they may.
@@ -327,7 +327,7 @@ class Renderer:
         slices: Sequence[Slice] = (),
         slice_map: ColorMap | str = "gray",
         outputs: Sequence[str] = ALL_OUTPUTS,
-        max_error: float | None = None,
+        max_surface_error: float | None = None,
         by: str = "proof",
         max_image_error: float | None = None,
         series: Sequence[Camera] = (),
@@ -377,12 +377,12 @@ class Renderer:
         clip, caps
             Up to 14 clipping planes, see ClipPlane and clip_box(): what is in all of their half
             spaces is drawn. Flat caps close cuts through what is inside the surface, or cuts are
-            open. A `max_error` by proof and the output "bounds" need whole surfaces.
+            open. A `max_surface_error` by proof and the output "bounds" need whole surfaces.
         surfaces
             Up to 8 surfaces in one picture, instead of `isovalue` and `color`: see Surface. Needs
             surfaces= of the constructor; not with max_image_error, time_budget; labels not with
-            voxel_pixels, max_error. Errors are those of each ray's first hit. Rays of `ambient`
-            and shadows end at those of opacity 1.
+            voxel_pixels, max_surface_error. Errors are those of each ray's first hit. Rays of
+            `ambient` and shadows end at those of opacity 1.
         slices, slice_map
             Planes that show the voxels beside the surfaces, see Slice: up to 8 with them, with
             their conditions. A ColorMap gives colours and range [the volume's]; the rest of it is
@@ -390,21 +390,22 @@ class Renderer:
         outputs
             Arrays of Image: "rgb", "depth", "normals", "position", "bounds", "surface", "cap",
             "field".
-        max_error
+        max_surface_error
             Largest distance between drawn and true surface [pixels], that the detail must keep: see
             statistics["detail"].
         by
-            "proof" of max_error, against the volume before compression, which needs bounds=True; or
-            "sample": 99 % of the hits keep it, against full detail. Needs levels=True.
+            "proof" of max_surface_error, against the volume before compression, which needs
+            bounds=True; or "sample": 99 % of the hits keep it, against full detail. Needs
+            levels=True.
         max_image_error
             Largest error of the picture, above 0 and up to 1: the mean of FLIP's over all pixels,
             against 64 rays a pixel at full detail. The cheapest rays and voxel_pixels are chosen
             that keep it with 95 % confidence, by tiles of the picture without ambient, shadow and
             bounce rays. Arrays then have statistics["detail"]["samples"] as many rows and columns.
-            Levels of detail need levels=True. Not with max_error.
+            Levels of detail need levels=True. Not with max_surface_error.
         series
-            Views, as of a movie, that share max_error or max_image_error: most hits of all of them
-            together, or the mean of their pictures, keep it.
+            Views, as of a movie, that share max_surface_error or max_image_error: most hits of all
+            of them together, or the mean of their pictures, keep it.
         voxel_pixels, voxel_error
             Largest distance between voxels of coarser levels [pixels], which needs levels=True, and
             largest difference of decoded voxels from the compressed ones [voxel values]; 0: none.

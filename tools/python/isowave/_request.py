@@ -111,7 +111,7 @@ class FrameArguments(Look, total=False):
     surfaces: Sequence[Surface]
     slices: Sequence[Slice]
     outputs: Sequence[str]
-    max_error: float | None
+    max_surface_error: float | None
     by: str
     max_image_error: float | None
     series: Sequence[Camera]
@@ -157,7 +157,7 @@ class Request:
     slices: Sequence[Slice] = ()
     slice_map: ColorMap | CheckedColorMap | str = "gray"
     outputs: Sequence[str] = ALL_OUTPUTS
-    max_error: float | None = None
+    max_surface_error: float | None = None
     by: str = "proof"
     max_image_error: float | None = None
     series: Sequence[Camera] = ()
@@ -195,7 +195,7 @@ class Request:
             "slices": slices_of(self.slices),
             "slice_map": slice_map_of(self.slice_map),
             "outputs": outputs,
-            "max_error": optional("max_error", self.max_error),
+            "max_surface_error": optional("max_surface_error", self.max_surface_error),
             "by": evidence_of(self.by),
             "max_image_error": optional("max_image_error", self.max_image_error),
             "series": series_of(self.series),
@@ -257,13 +257,13 @@ class Request:
     @property
     def needs(self) -> dict[str, str]:
         """Options that a renderer needs to draw this, and the argument that needs each option."""
-        by_proof = self.max_error is not None and self.by == "proof"
-        by_sample = self.max_error is not None and self.by == "sample"
+        by_proof = self.max_surface_error is not None and self.by == "proof"
+        by_sample = self.max_surface_error is not None and self.by == "sample"
         of_levels = by_sample and not self.num_surfaces  # several surfaces have the finest alone
         asked = {
-            "bounds": ("max_error", by_proof or "bounds" in self.outputs),
+            "bounds": ("max_surface_error", by_proof or "bounds" in self.outputs),
             "levels": (
-                "max_error" if by_sample else "voxel_pixels",
+                "max_surface_error" if by_sample else "voxel_pixels",
                 of_levels or self.voxel_pixels > 0,
             ),
             "time_budget": ("time_budget", self.time_budget is not None),
@@ -303,7 +303,7 @@ class Request:
             **slice_map_for_core(slice_map_of(self.slice_map)),
             "voxel_pixels": self.voxel_pixels,
             "voxel_error": self.voxel_error,
-            "max_surface_error": self.max_error,
+            "max_surface_error": self.max_surface_error,
             "by": self.by,
             "max_image_error": self.max_image_error,
             "series": [camera_for_core(camera) for camera in self.series],

@@ -199,7 +199,7 @@ def add_isosurface(
     name
         Name of the layer. A surface layer of this name is replaced.
     request
-        Arguments of Volume.render(): color, normals, device, max_error and so on.
+        Arguments of Volume.render(): color, normals, device, max_surface_error and so on.
 
     Raises
     ------

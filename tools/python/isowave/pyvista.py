@@ -176,7 +176,7 @@ def add_isosurface(
     *,
     color: Color | None = None,
     device: str | int | None = None,
-    max_error: float | None = None,
+    max_surface_error: float | None = None,
     by: str = "proof",
     voxel_pixels: float = 0.0,
     normals: str = "smooth",
@@ -205,7 +205,7 @@ def add_isosurface(
         "#rrggbb", a name such as "bone", or red, green, blue from 0 to 1.
     device, memory_budget
         As for Volume.render.
-    max_error, by, voxel_pixels, normals, clip, caps
+    max_surface_error, by, voxel_pixels, normals, clip, caps
         As for Renderer.render. PyVista's planes are ClipPlane.through(origin, normal).
     reset_camera
         Whether to set the camera so that all of the scene is seen; None: unless it was set.
@@ -225,7 +225,7 @@ def add_isosurface(
         clip=clip,
         caps=caps,
         outputs=("rgb", "depth"),
-        max_error=max_error,
+        max_surface_error=max_surface_error,
         by=by,
         voxel_pixels=voxel_pixels,
     )

@@ -156,7 +156,7 @@ def test_bounds_of_the_error(drawn, levelled):
     expect(
         pictures,
         "bounded",
-        renderer.render(40, max_error=0.5, outputs=("rgb", "depth", "bounds")),
+        renderer.render(40, max_surface_error=0.5, outputs=("rgb", "depth", "bounds")),
     )
     renderer = isowave.open(FUEL, rate=8).renderer(size=(64, 48), bounds=True)
     expect(pictures, "rated", renderer.render(40, voxel_error=2.0, outputs=("bounds", "depth")))
@@ -183,7 +183,7 @@ def test_bounds_of_the_error(drawn, levelled):
         ("answer", "what on_pass returns"),
         ("one on_pass", "rank 1 has another request than rank 0"),
         ("time", "a BrickRenderer draws without time_budget"),
-        ("max_error", "made with_bounds"),
+        ("max_surface_error", "made with_bounds"),
         ("no error", "an error of 0 pixels cannot be kept"),
         ("too large", "960"),
         ("levels", "bricks have levels of detail that are in a .zfp file"),

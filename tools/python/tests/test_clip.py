@@ -132,7 +132,7 @@ def test_planes_that_cannot_be_drawn_are_refused(ball: isowave.Volume) -> None:
     refuse("normal is 0 0 0: give a direction", clip=[ClipPlane((0, 0, 0))])
     refuse("normal is nan 0 0: give a direction", clip=[ClipPlane((math.nan, 0, 0))])
     refuse("offset is inf: give a number", clip=[ClipPlane((1, 0, 0), math.inf)])
-    refuse("errors are proven of whole surfaces: leave out clip", max_error=1.0)
+    refuse("errors are proven of whole surfaces: leave out clip", max_surface_error=1.0)
     refuse("errors are bounded of whole surfaces: leave out clip", outputs=("bounds",))
     renderer.render(0, camera=CAMERA, clip=14 * [OBLIQUE])
 

@@ -228,7 +228,7 @@ def test_arguments_of_a_wrong_type_are_named(volume):
         "size": [lambda v: render(6, size=v), 5, (64.5, 48), (1, 2, 3), (-1, 5)],
         "camera": [lambda v: render(6, camera=v), "front", 5],
         "outputs": [lambda v: render(6, size=SIZE, outputs=v), "rgb"],
-        "max_error": [lambda v: render(6, max_error=v), "1"],
+        "max_surface_error": [lambda v: render(6, max_surface_error=v), "1"],
         "color": [lambda v: render(6, size=SIZE, color=v), 5, (1, 2), ("a", "b", "c")],
         "memory_budget": [lambda v: make(memory_budget=v), 1e9, 600.5, -1],
         "Renderer's levels": [lambda v: make(levels=v), 1, "no"],

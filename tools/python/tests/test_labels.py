@@ -134,7 +134,7 @@ def test_what_is_no_label_is_refused(
 @pytest.mark.parametrize(
     "more, message",
     [
-        ({"max_error": 2}, "without max_error"),
+        ({"max_surface_error": 2}, "without max_surface_error"),
         ({"voxel_pixels": 1}, "without voxel_pixels"),
         ({"time_budget": 1.0}, "without time_budget"),
         ({"slices": [Slice("x", 5)]}, "without slices"),

@@ -226,8 +226,13 @@ def test_device_and_host_draw_the_same_bits(volume):
 
 
 def test_the_host_draws_all_that_a_device_draws():
-    options = {"voxel_pixels": 2.0}, {"max_error": 1.0}, {"time_budget": 1e6}, {"ambient": 2}
-    options += ({"max_error": 1.0, "by": "sample"},)
+    options = (
+        {"voxel_pixels": 2.0},
+        {"max_surface_error": 1.0},
+        {"time_budget": 1e6},
+        {"ambient": 2},
+    )
+    options += ({"max_surface_error": 1.0, "by": "sample"},)
     finer = isowave.compress(sphere_voxels(), tolerance=0.01, levels=3)
     needed = {"levels": True, "bounds": True, "time_budget": True, "rays": True}
     on_device, on_host = finer.renderer(size=SIZE, **needed), host_renderer(finer)
@@ -366,7 +371,7 @@ def test_ranges_that_blocks_leave_give_no_bounds(tmp_path):
 
 def test_errors_are_kept_and_bounds_given():
     volume = isowave.compress(sphere_voxels((40, 44, 48)), tolerance=0.001, levels=2)
-    image = volume.render(10, size=SIZE, max_error=0.5, outputs=("rgb", "depth", "bounds"))
+    image = volume.render(10, size=SIZE, max_surface_error=0.5, outputs=("rgb", "depth", "bounds"))
     assert image.statistics["detail"]["reachable"]
     hit = np.isfinite(image.depth)
     assert np.isfinite(image.bounds[hit]).mean() > 0.5
@@ -388,7 +393,9 @@ def test_errors_are_kept_and_bounds_given():
 def test_an_error_is_kept_by_sample():
     volume = isowave.compress(sphere_voxels((40, 44, 48)), tolerance=0.001, levels=0)
     view = volume.camera(10, size=SIZE)
-    image = volume.render(10, camera=view, size=SIZE, max_error=1.0, by="sample", device="host")
+    image = volume.render(
+        10, camera=view, size=SIZE, max_surface_error=1.0, by="sample", device="host"
+    )
     detail = image.statistics["detail"]
     assert detail["reachable"] and 0.99 <= detail["lowest_share"] <= 1
     assert 299 <= detail["within"] <= detail["sampled_hits"] <= detail["sampled_rays"] == 64 * 48
@@ -397,7 +404,7 @@ def test_an_error_is_kept_by_sample():
     series = isowave.Camera.orbit(volume, 3)
     renderer = volume.renderer(size=SIZE, levels=True, device="host")
     shared = [
-        renderer.render(10, camera=camera, series=series, max_error=1.0, by="sample")
+        renderer.render(10, camera=camera, series=series, max_surface_error=1.0, by="sample")
         for camera in series
     ]
     first, *others = (each.statistics["detail"] for each in shared)
@@ -420,7 +427,7 @@ def test_an_error_of_the_picture_is_kept():
     assert np.array_equal(volume.render(10, size=SIZE, **chosen).rgb, image.rgb)
     beyond = volume.render(10, size=SIZE, max_image_error=1e-6).statistics["detail"]
     assert not beyond["reachable"] and "up to 8 x 8" in beyond["advice"]
-    for argument in ({"max_error": 1.0}, {"time_budget": 1.0}, {"voxel_pixels": 1.0}):
+    for argument in ({"max_surface_error": 1.0}, {"time_budget": 1.0}, {"voxel_pixels": 1.0}):
         with pytest.raises(isowave.Error):
             volume.render(10, size=SIZE, max_image_error=0.05, **argument)
 
@@ -429,7 +436,7 @@ def test_bad_requests_are_one_line(volume, renderer):
     cases = [
         lambda: renderer.render(float("nan")),
         lambda: renderer.render(6, size=(640, 480)),
-        lambda: renderer.render(6, max_error=1.0),
+        lambda: renderer.render(6, max_surface_error=1.0),
         lambda: renderer.render(6, time_budget=1.0),
         lambda: renderer.render(6, voxel_pixels=1.0),
         lambda: renderer.render(6, outputs=("rgb", "alpha")),

@@ -351,8 +351,8 @@ def test_what_cannot_be_drawn(plotter, volume):
         adapter.screenshot(plotter)
 
 
-def test_max_error(plotter, volume):
-    surface = adapter.add_isosurface(plotter, volume, RADIUS, color=GREY, max_error=1)
+def test_max_surface_error(plotter, volume):
+    surface = adapter.add_isosurface(plotter, volume, RADIUS, color=GREY, max_surface_error=1)
     assert is_grey(adapter.screenshot(plotter)).any() and surface.image.complete
 
 

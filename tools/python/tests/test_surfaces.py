@@ -51,7 +51,9 @@ def test_errors_are_those_of_the_first_crossing(device: str) -> None:
     voxels = RADIUS - sphere_voxels((25, 24, 31))
     volume = isowave.compress(voxels, rate=20, origin=(30, 20, 10))
     options = {"camera": CAMERA, "size": SIZE, "device": device}
-    image = volume.render(surfaces=BOTH, outputs=("depth", "bounds"), max_error=2.0, **options)
+    image = volume.render(
+        surfaces=BOTH, outputs=("depth", "bounds"), max_surface_error=2.0, **options
+    )
     assert image.depth is not None and image.bounds is not None
     is_hit = np.isfinite(image.depth)
     assert is_hit.sum() > 500 and np.mean(image.bounds[is_hit] <= 2.0) > 0.95
@@ -59,7 +61,7 @@ def test_errors_are_those_of_the_first_crossing(device: str) -> None:
     assert detail["voxel_pixels"] == 0 < detail["voxel_error"]
     outer = volume.render(0, outputs=("bounds",), voxel_error=detail["voxel_error"], **options)
     assert np.array_equal(image.bounds, outer.bounds)
-    sample = volume.render(surfaces=BOTH, max_error=2.0, by="sample", **options)
+    sample = volume.render(surfaces=BOTH, max_surface_error=2.0, by="sample", **options)
     assert sample.statistics["detail"]["voxel_error"] > 0
 
 

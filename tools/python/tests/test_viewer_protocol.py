@@ -66,7 +66,12 @@ def test_messages_are_read() -> None:
     camera = Camera((0, 0, 5), (0, 0, 0), (0, 1, 0), 60)
     colors: dict[str, Any] = {"color": (1, 0.5, 0), "background": (1, 1, 1), "outputs": ("rgb",)}
     clip: dict[str, Any] = {"clip": [ClipPlane((0, 0.5, -1), -20)], "caps": False}
-    more: dict[str, Any] = {"max_error": 0.5, "by": "sample", "ambient": 16, "progress": False}
+    more: dict[str, Any] = {
+        "max_surface_error": 0.5,
+        "by": "sample",
+        "ambient": 16,
+        "progress": False,
+    }
     asked = Request(80, camera, (64, 48), 2, **colors, **clip, **more)
     assert check(parse(json.dumps(WISH))) == Wish(7, asked)
     timed = check({**WISH, "max_error": None, "time_budget": 50})
@@ -78,7 +83,11 @@ def test_messages_are_read() -> None:
     assert isinstance(deep, Wish) and deep.request.color is None and not deep.request.needs_field
     seen = check({**WISH, "by": "picture", "max_error": 0.01})
     assert isinstance(seen, Wish) and seen.request.max_image_error == 0.01
-    assert (seen.request.max_error, seen.request.by, seen.request.samples) == (None, "proof", 2)
+    assert (seen.request.max_surface_error, seen.request.by, seen.request.samples) == (
+        None,
+        "proof",
+        2,
+    )
     free = check({**WISH, "by": "picture", "max_error": None, "time_budget": 50})
     assert isinstance(free, Wish) and free.request.max_image_error is None
     layered = check({**WISH, **PLAIN, "surfaces": [SURFACE, {**SURFACE, "isovalue": 120}]})

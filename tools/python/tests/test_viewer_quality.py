@@ -188,12 +188,12 @@ def test_the_page_asks_for_levels_of_detail(open_page: Callable[..., Any]) -> No
         type_into(page.get_by_label("Accurate to"), "2")
         page.keyboard.press("Enter")
         request = asked(page, volume)
-        assert (request.voxel_pixels, request.max_error) == (0, 2)
+        assert (request.voxel_pixels, request.max_surface_error) == (0, 2)
         assert voxels.input_value() == "" and "voxels" not in state(page)
         type_into(voxels, "4")
         page.keyboard.press("Enter")
         request = asked(page, volume)
-        assert (request.voxel_pixels, request.max_error) == (4, None)
+        assert (request.voxel_pixels, request.max_surface_error) == (4, None)
         for text in ("0", "-1", "2000"):
             type_into(voxels, text)
             page.keyboard.press("Enter")
@@ -227,11 +227,18 @@ def test_the_page_asks_for_an_error_of_the_picture(
         asked(page, volume)
         type_into(error, "2")
         page.keyboard.press("Enter")
-        assert asked(page, volume).max_error == 2 and not page.locator(".of_picture").is_visible()
+        assert (
+            asked(page, volume).max_surface_error == 2
+            and not page.locator(".of_picture").is_visible()
+        )
         # Pixels are no FLIP: the number goes, and the limits are others.
         page.get_by_label("Judged by").select_option("picture")
         request = asked(page, volume)
-        assert (request.max_error, request.max_image_error, request.samples) == (None, None, 1)
+        assert (request.max_surface_error, request.max_image_error, request.samples) == (
+            None,
+            None,
+            1,
+        )
         assert error.input_value() == "" and page.locator(".of_error").inner_text() == "FLIP"
         assert "64 rays a pixel at full detail" in page.locator(".of_picture").inner_text()
         for text in ("0", "1.5", "-1"):
@@ -243,7 +250,11 @@ def test_the_page_asks_for_an_error_of_the_picture(
         type_into(error, "0.01")
         page.keyboard.press("Enter")
         request = asked(page, volume)
-        assert (request.max_error, request.max_image_error, request.samples) == (None, 0.01, 4)
+        assert (request.max_surface_error, request.max_image_error, request.samples) == (
+            None,
+            0.01,
+            4,
+        )
         assert page.get_by_label("Most rays per pixel").input_value() == "4"
         assert "4 rays a pixel" in facts.inner_text()
         assert "FLIP 0.008, at most 0.01 with 95 % confidence" in facts.inner_text()
@@ -294,14 +305,14 @@ def test_addresses_of_errors(
         page = open_page(viewport={"width": 400, "height": 300})
         page.goto(f"{server.url}#{hash_text}")
         request = asked(page, volume)
-        assert (request.max_error, request.max_image_error, request.samples) == expected
+        assert (request.max_surface_error, request.max_image_error, request.samples) == expected
         # In an open page, a number in pixels is no FLIP.
         page.evaluate("location.hash = '#error=0.5&by=picture'")
         assert asked(page, volume).max_image_error == 0.5
         page.evaluate("location.hash = '#error=0.5'")
         request = asked(page, volume)
-        assert (request.max_error, request.max_image_error) == (0.5, None)
+        assert (request.max_surface_error, request.max_image_error) == (0.5, None)
         page.evaluate("location.hash = '#by=picture'")
         request = asked(page, volume)
-        assert (request.max_error, request.max_image_error) == (None, None)
+        assert (request.max_surface_error, request.max_image_error) == (None, None)
         assert page.problems == []

@@ -127,7 +127,7 @@ def test_on_a_machine_without_a_gpu_the_host_draws_all_of_a_wish() -> None:
     run(scene)
     whole = volume.frames[0]
     assert (whole.size, whole.request.ambient) == ((1600, 1200), 2)
-    assert (whole.request.max_error, whole.request.time_budget) == (0.5, 5.0)
+    assert (whole.request.max_surface_error, whole.request.time_budget) == (0.5, 5.0)
     assert eye.pictures == [(1, "whole"), (1, "lossless")]
     assert eye.of_type("picture")[0]["reduced"] is None
     assert eye.of_type("bounds")[-1]["within_pixel"] > 0

@@ -51,10 +51,10 @@ def test_slices_are_added_moved_and_removed(open_page: Callable[..., Any]) -> No
         assert asked(page, volume).slices == () and not page.locator(".slice_look").is_visible()
         type_into(page.get_by_label("Accurate to"), "1")
         page.keyboard.press("Enter")
-        assert asked(page, volume).max_error == 1
+        assert asked(page, volume).max_surface_error == 1
         button(page, "Add z").click()
         request = asked(page, volume)
-        assert request.slices == (Slice(Z, MIDDLE),) and request.max_error == 1
+        assert request.slices == (Slice(Z, MIDDLE),) and request.max_surface_error == 1
         assert request.slice_map == slice_map_of("gray") and request.surfaces == ()
         assert page.get_by_label("Time per picture").is_disabled(), "not with slices"
         button(page, "Add x").click()
@@ -86,7 +86,7 @@ def test_slices_are_added_moved_and_removed(open_page: Callable[..., Any]) -> No
         button(page, "Remove slice 1").click()
         assert asked(page, volume).slices == moved[1:]
         button(page, "Remove slice 1").click()
-        assert asked(page, volume).max_error == 1 and "slices" not in state(page)
+        assert asked(page, volume).max_surface_error == 1 and "slices" not in state(page)
         assert page.get_by_label("Accurate to").is_enabled() and not page.problems
 
 

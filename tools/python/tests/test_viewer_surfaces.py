@@ -61,7 +61,7 @@ def test_surfaces_are_added_changed_and_removed(
         assert changes(page, lambda: field(page, "Opacity", 1).fill("0.4"))
         button(page, "Add surface").click()
         assert asked(page, volume) == [(80, 0.4), (90.5, 0.5)]
-        assert volume.frames[-1].request.max_error == 1
+        assert volume.frames[-1].request.max_surface_error == 1
         assert page.get_by_label("Time per picture").is_disabled()
         # The slider moves the surface that is selected.
         slider = page.get_by_label("Isovalue of surface 2 on the histogram")

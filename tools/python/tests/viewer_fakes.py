@@ -203,9 +203,11 @@ class FakeRenderer:
         image_error = request.max_image_error
         if request.num_surfaces and (image_error or request.time_budget):
             raise RuntimeError("surfaces are drawn without max_image_error and time_budget")
-        if request.has_labels and request.max_error:
-            raise RuntimeError("labels are drawn without max_error")
-        if image_error and (request.max_error or request.time_budget or request.voxel_pixels):
+        if request.has_labels and request.max_surface_error:
+            raise RuntimeError("labels are drawn without max_surface_error")
+        if image_error and (
+            request.max_surface_error or request.time_budget or request.voxel_pixels
+        ):
             raise RuntimeError("max_image_error chooses the detail, and is kept alone")
         if request.voxel_pixels and not self._options["levels"]:
             raise RuntimeError("the renderer was not made for levels of detail")

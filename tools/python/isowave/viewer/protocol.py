@@ -444,7 +444,7 @@ def _error(content: dict[str, Any]) -> dict[str, Any]:
         raise ProtocolError("a picture keeps max_error or time_budget, not both")
     if by == "picture":
         return {"max_image_error": _number(value, MIN_IMAGE_ERROR, 1, "max_error")}
-    return {"max_error": _number(value, 1e-3, 1e3, "max_error"), "by": by}
+    return {"max_surface_error": _number(value, 1e-3, 1e3, "max_error"), "by": by}
 
 
 def _voxel_pixels(content: dict[str, Any], surfaces: tuple[Surface, ...]) -> float:

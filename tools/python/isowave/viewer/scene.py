@@ -360,7 +360,7 @@ class Scene:
             on_pass=lambda so_far: self._on_pass(frame, so_far),
         )
         if frame.by_host:  # full detail until the device draws, not interrupted by a time
-            request = replace(request, max_error=None, by="proof", time_budget=None)
+            request = replace(request, max_surface_error=None, by="proof", time_budget=None)
         if frame.by_host or self._steps.volume.num_levels == 1:
             request = replace(request, voxel_pixels=0.0)
         image = renderer.draw(request)
@@ -517,12 +517,12 @@ class Scene:
         if client.camera is None:
             return
         pixels = extent.size[1] / wish.size[1]  # of the first picture, to one of the whole picture
-        max_error = wish.request.max_error
+        error = wish.request.max_surface_error
         voxel_pixels = client.voxel_pixels or wish.request.voxel_pixels
         request = replace(
             extent.request(wish.request, client.camera),
             outputs=("depth", "bounds"),
-            max_error=None if max_error is None else max_error * pixels,
+            max_surface_error=None if error is None else error * pixels,
             voxel_pixels=voxel_pixels * pixels if self._steps.volume.num_levels > 1 else 0.0,
             time_budget=None,
             color_map=None,
