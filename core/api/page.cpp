@@ -177,12 +177,12 @@ EngineParts read_parts(const fs::path &wanted) {
   return parts;
 }
 
-/// Writes a page.
+/// Writes a page, and leaves it to the caller to commit its file.
 ///
 /// connect       what the page's policy allows beside what all pages need
 /// write_volume  writes what stands in the volume's place
 template <class WriteVolume>
-void write_page(const Scene &scene, const fs::path &path, const PageOptions &options,
+void write_page(const Scene &scene, core::AtomicFile &file, const PageOptions &options,
                 std::span<const std::uint8_t> poster, std::string_view connect,
                 const WriteVolume &write_volume) {
   const EngineParts parts = read_parts(options.engine);
@@ -193,7 +193,6 @@ void write_page(const Scene &scene, const fs::path &path, const PageOptions &opt
   shown.dataset.clear();
   shown.index.clear();
 
-  core::AtomicFile file(path);
   file.write(parts[0]);
   file.write(connect);
   file.write(parts[1] + to_html(title) + parts[2]);
@@ -201,9 +200,8 @@ void write_page(const Scene &scene, const fs::path &path, const PageOptions &opt
   picture.write(std::as_bytes(poster));
   picture.finish();
   file.write(parts[3] + to_json_of_page(scene_text(shown)) + parts[4]);
-  write_volume(file);
+  write_volume();
   file.write(parts[5]);
-  file.commit();
 }
 
 /// Writes a volume in chunks, with all levels of detail that it can have.
@@ -281,12 +279,14 @@ void save_page(const std::shared_ptr<const Volume> &volume, const Scene &scene,
           mebibytes, kMostMebibytes);
     Scene shown = scene;
     const std::vector<std::uint8_t> poster = draw_poster(volume, shown, options.poster);
-    write_page(scene, path, options, poster, {}, [&](core::AtomicFile &file) {
+    core::AtomicFile file(path);
+    write_page(scene, file, options, poster, {}, [&] {
       Base64Text bytes(file);
       core::give_zfp_file(volume->implementation().volume, path,
                           [&](std::span<const std::byte> piece) { bytes.write(piece); });
       bytes.finish();
     });
+    file.commit();
   });
 }
 
@@ -310,11 +310,13 @@ void save_site(const std::shared_ptr<const Volume> &volume, const Scene &scene,
     NewFolder new_folder(folder);
     Scene shown = scene;
     const std::vector<std::uint8_t> poster = draw_poster(volume, shown, options.poster);
-    core::AtomicFile file(chunks);
-    const core::ChunkFileSize size = write_site_volume(volume->implementation().volume, file);
-    write_page(shown, page, options, poster, kSiteConnect,
-               [&](core::AtomicFile &to) { to.write(text_of_site(*volume, size)); });
-    file.commit();
+    core::AtomicFile chunks_file(chunks), page_file(page);
+    const core::ChunkFileSize size =
+        write_site_volume(volume->implementation().volume, chunks_file);
+    write_page(shown, page_file, options, poster, kSiteConnect,
+               [&] { page_file.write(text_of_site(*volume, size)); });
+    chunks_file.commit();
+    page_file.commit();
     new_folder.keep();
   });
 }
