@@ -322,28 +322,45 @@ void HostBlocks::open(Selection &selection, std::size_t block) {
   // Beyond the volume, any voxels do: they matter to cells outside it alone.
   for (uint corner = 0; corner < 8; ++corner)
     dual_grid[corner] = block_at(glm::min(place + corner_of(corner), blocks_ - 1u));
-  check_chunks(dual_grid);
+  const bool are_there = find_chunks(dual_grid);
   room_->with_room([&] {
-    for (const std::size_t id : dual_grid) decode_once(id);
+    decode_or_guess(dual_grid, are_there);
     take_page(selection.changing, block);
-    find_changing(selection, block, dual_grid);
+    if (are_there) {
+      find_changing(selection, block, dual_grid);
+    } else {
+      selection.changing.items()[block] = 0;
+    }
   });
 }
 
 void HostBlocks::decode(std::span<const std::size_t> blocks) {
-  check_chunks(blocks);
-  room_->with_room([&] {
-    for (const std::size_t id : blocks) decode_once(id);
-  });
+  const bool are_there = find_chunks(blocks);
+  room_->with_room([&] { decode_or_guess(blocks, are_there); });
 }
 
-/// Throws ChunkIsMissing if blocks are not there; all chunks that they lack are then noted.
-void HostBlocks::check_chunks(std::span<const std::size_t> blocks) const {
-  if (!volume_->chunks) return;
+/// Whether these blocks are there, or have been decoded. If not, all chunks that they lack are
+/// noted.
+///
+/// Throws  ChunkIsMissing: not, and the rays may not guess (BlockChunks)
+bool HostBlocks::find_chunks(std::span<const std::size_t> blocks) const {
+  if (!volume_->chunks) return true;
   bool are_there = true;
   for (const std::size_t id : blocks)
     are_there = (is_decoded(id) || volume_->chunks->is_there(id)) && are_there;
-  if (!are_there) throw ChunkIsMissing();
+  if (!are_there) volume_->chunks->guess();
+  return are_there;
+}
+
+/// Decodes blocks; or if some are not there, has memory at their places, with any values.
+void HostBlocks::decode_or_guess(std::span<const std::size_t> blocks, bool are_there) {
+  for (const std::size_t id : blocks) {
+    if (are_there) {
+      decode_once(id);
+    } else {
+      take_page(values_, std::uint64_t{ISO_BLOCK_VOXELS} * id);
+    }
+  }
 }
 
 void HostBlocks::decode_once(std::size_t block) {

@@ -163,7 +163,8 @@ class HostBlocks {
   void release(BlockPages<T> &pages);
   template <class T>
   void take_page(BlockPages<T> &pages, std::uint64_t item);
-  void check_chunks(std::span<const std::size_t> blocks) const;
+  bool find_chunks(std::span<const std::size_t> blocks) const;
+  void decode_or_guess(std::span<const std::size_t> blocks, bool are_there);
   void decode_once(std::size_t block);
   void decode_to(std::size_t block, float *values) const;
   void find_changing(Selection &selection, std::size_t block,

@@ -29,6 +29,10 @@ namespace {
 constexpr std::uint32_t kTileRays = 16;
 /// The same of a volume in chunks: the rays of a tile wait together.
 constexpr std::uint32_t kWaitingTileRays = 8;
+/// Missing chunks that a tile may note before it waits: in a frame's first call, and at most. Each
+/// further call doubles them, for the rays that are left: so few of them wait often, and what is
+/// read in vain is about as much as what is needed.
+constexpr std::uint32_t kFirstGuesses = 4, kMostGuesses = 1u << 16;
 /// Tiles of a band for each thread: enough that no thread waits long for the last.
 constexpr std::uint32_t kTilesPerThread = 8;
 /// Rays of any origin that a thread takes at a time.
@@ -98,6 +102,10 @@ HostRenderer::HostRenderer(const CompressedVolume &volume, const HostRendererOpt
       setup_ms_(0) {
   check_image_size(options.largest);
   abilities_.largest = options.largest;
+  if (volume.chunks) chunks_.push_back(volume.chunks.get());
+  for (const CompressedVolume &level : volume.coarser_levels) {
+    if (level.chunks) chunks_.push_back(level.chunks.get());
+  }
   if (options.field != nullptr) {
     check_volume_info(options.field->info, "the field");
     const bool is_own = options.field == &volume;
@@ -127,6 +135,7 @@ Abilities HostRenderer::abilities_of(const CompressedVolume &volume) {
 FrameStats HostRenderer::render(const FrameRequest &request) {
   const auto begin = std::chrono::steady_clock::now();
   any_waits_ = false;
+  guesses_ = goes_on_ ? std::min(2 * guesses_, kMostGuesses) : kFirstGuesses;
   check(request, abilities());
   const ImageSize size = size_of(request, abilities());
   if (rows_[0] >= std::min(rows_[1], size.height))
@@ -281,6 +290,7 @@ void HostRenderer::draw_surfaces(const FrameRequest &request, std::span<const Fr
     const std::uint64_t num_hits = blend(
         surfaces, by, tile, next.data(),
         {hits_.data(), colors_.data(), &of_tile, layers.empty() ? nullptr : layers_of_tile.data()});
+    if (has_guessed()) return num_hits;
     const std::scoped_lock lock(mutex);
     stats.layers.add(of_tile);
     for (std::size_t layer = 0; layer < layers.size(); ++layer)
@@ -363,7 +373,8 @@ void HostRenderer::draw_bands(const FrameRequest &request, DrawTile draw_tile, F
           const auto row = hits_.begin() + static_cast<std::ptrdiff_t>(y * frame_.view.width);
           std::fill(row + tile.begin_x, row + tile.end_x, no_hit());
         }
-        num_hits += draw_tile(tile, is_alone);
+        const std::uint64_t num_hits_of_tile = draw_tile(tile, is_alone);
+        if (!has_guessed()) num_hits += num_hits_of_tile;
       },
       [&](std::uint32_t rows) {
         PassStats pass;
@@ -492,12 +503,20 @@ void HostRenderer::draw_or_wait(Loop loop, std::uint64_t tile, Draw draw) {
   if (!volume_.chunks) return draw();
   const bool keeps = loop == Loop::kHits && tile < finished_.size();
   if (keeps && finished_[tile] != 0) return;
+  for (BlockChunks *of_level : chunks_) of_level->begin_guesses(guesses_);
+  bool is_finished = false;
   try {
     draw();
-    if (keeps) finished_[tile] = 1;
+    is_finished = !has_guessed();
   } catch (const ChunkIsMissing &) {
-    any_waits_ = true;
   }
+  if (!is_finished) any_waits_ = true;
+  if (keeps && is_finished) finished_[tile] = 1;
+}
+
+/// Whether the tile that is drawn has gone past chunks that are not there.
+bool HostRenderer::has_guessed() const {
+  return std::ranges::any_of(chunks_, &BlockChunks::has_guessed);
 }
 
 std::array<std::uint32_t, 2> HostRenderer::rows_of_rays() const {

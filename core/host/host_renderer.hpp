@@ -114,6 +114,7 @@ class HostRenderer : public Renderer {
                       bool is_smooth);
   template <class Draw>
   void draw_or_wait(Loop loop, std::uint64_t tile, Draw draw);
+  bool has_guessed() const;
   template <class DrawTile>
   void draw_bands(const FrameRequest &request, DrawTile draw_tile, FrameStats &stats);
   void add_field_values(const FrameRequest &request, FrameStats &stats);
@@ -141,6 +142,8 @@ class HostRenderer : public Renderer {
   FrameParams frame_{};  ///< of the finest level, for shading
   ImageSize size_;
   std::array<std::uint32_t, 2> rows_{0, ~0u};  ///< that are drawn: from, to
+  std::vector<BlockChunks *> chunks_{};        ///< of all levels of detail that have some
+  std::uint32_t guesses_ = 0;  ///< missing chunks that a tile may note before it waits
   bool goes_on_ = false;
   std::atomic<bool> any_waits_ = false;  ///< a tile of the frame, for chunks
   std::vector<std::uint8_t> finished_;   ///< [tile] of a volume in chunks

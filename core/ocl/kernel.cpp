@@ -17,6 +17,11 @@ Range Range::strided(std::size_t max_count, std::size_t group_size, const Device
   return range;
 }
 
+Range Range::each(std::size_t count, std::size_t group_size, const Device &device) {
+  return device.info().type == DeviceType::kGpu ? strided(count, group_size, device)
+                                                : covering(count, group_size);
+}
+
 Range Range::in_parts(std::uint64_t count, const Device &device) const {
   const std::uint64_t most = device.capabilities().elements_per_launch;
   Range range = *this;

@@ -71,6 +71,10 @@ struct Range {
   /// than of others.
   static Range strided(std::size_t max_count, std::size_t group_size, const Device &device,
                        std::size_t oversubscribe = 1);
+  /// For grid-stride kernels that do about the same for each element, and read what lies beside it
+  /// in memory: as covering() on CPUs, whose drivers run the work-items of a group one after the
+  /// other, and so read memory in its order; as strided() on GPUs.
+  static Range each(std::size_t count, std::size_t group_size, const Device &device);
 };
 
 class RawKernel {

@@ -12,7 +12,7 @@ KeptPicture::KeptPicture(ocl::Device &device, std::uint64_t num_rays)
 void KeptPicture::compile(Wavefront &rays) {
   for (const std::uint64_t num_rays :
        {std::uint64_t{1}, rays.num_rays})  // PoCL compiles large ones anew
-    show_(ocl::Range::strided(num_rays, ocl::kGroupSize, device_), FrameParams{}, 1, 1, hits_, 0u,
+    show_(ocl::Range::each(num_rays, ocl::kGroupSize, device_), FrameParams{}, 1, 1, hits_, 0u,
           rays.hits);
 }
 
@@ -23,7 +23,7 @@ void KeptPicture::keep(const Wavefront &rays, ImageSize size) {
 
 void KeptPicture::show(Wavefront &rays, bool everywhere) {
   const std::uint64_t num_rays = std::uint64_t{rays.frame.view.width} * rays.frame.view.height;
-  show_(ocl::Range::strided(num_rays, ocl::kGroupSize, device_), rays.frame, size_.ray_columns(),
+  show_(ocl::Range::each(num_rays, ocl::kGroupSize, device_), rays.frame, size_.ray_columns(),
         size_.ray_rows(), hits_, everywhere ? 1u : 0u, rays.hits);
 }
 

@@ -43,7 +43,7 @@ void Shade::compile(Wavefront &rays, const ocl::Buffer<RayColor> *layers) {
   for (const std::size_t num_pixels :
        {std::size_t{1}, staging_.size() / sizeof(uint)}) {  // PoCL compiles large ones anew
     const auto range = [&](std::size_t items) {
-      return ocl::Range::strided(items, ocl::kGroupSize, device_);
+      return ocl::Range::each(items, ocl::kGroupSize, device_);
     };
     shade_(range(num_items(num_pixels)), FrameParams{}, ShadeParams{}, color_map_, 1, rays.hits,
            rays.open_counts, 0u, 0u, rays.bounced, 0u, rays.field_values, 0u, staging_);
@@ -68,7 +68,7 @@ void Shade::shade(const Shading &shading, Wavefront &rays, const ocl::Buffer<Ray
   const std::size_t num_pixels =
       std::size_t{rays.frame.view.width / samples} * (rays.frame.view.height / samples);
   image = memory_.array<T>(kAsWords ? num_pixels : num_channels(&params) * num_pixels);
-  const ocl::Range range = ocl::Range::strided(num_items(num_pixels), ocl::kGroupSize, device_);
+  const ocl::Range range = ocl::Range::each(num_items(num_pixels), ocl::kGroupSize, device_);
   const uint with_alpha = kAsWords || params.transparent != 0 ? 1u : 0u;
   if (layers != nullptr) {
     shade_layers_(range, rays.frame, params, samples, *layers, with_alpha, staging_);
@@ -98,7 +98,7 @@ FrameArrays Shade::operator()(const WantedArrays &wanted, const Shading &shading
                               std::uint32_t samples) {
   const std::size_t num_rays = std::size_t{rays.frame.view.width} * rays.frame.view.height;
   const auto range = [&](uint count) {
-    return ocl::Range::strided(count, ocl::kGroupSize, device_);
+    return ocl::Range::each(count, ocl::kGroupSize, device_);
   };
   ocl::InFlight<FrameArrays> arrays(device_);
   if (wanted.picture) shade(shading, rays, layers, samples, arrays->picture);

@@ -46,7 +46,8 @@ glm::uvec3 BlockChunks::size_of(std::uint32_t macrocell) const {
 BlockChunks::Chunk *BlockChunks::find(std::uint32_t macrocell) {
   const auto found = chunks_.find(macrocell);
   if (found == chunks_.end()) {
-    missing_.insert(places_[macrocell]);
+    const bool is_new = missing_.insert(places_[macrocell]).second;
+    if (is_new && new_ones_left_ != 0) --new_ones_left_;
     return nullptr;
   }
   found->second.is_used = true;
@@ -64,6 +65,16 @@ BlockChunks::Block BlockChunks::block(std::uint64_t block) {
   const std::uint32_t first = chunk->first_bits[at.block];
   return {chunk->words.data(), first, chunk->first_bits[at.block + 1] - first,
           chunk->no_data.empty() ? 0 : chunk->no_data[at.block]};
+}
+
+void BlockChunks::begin_guesses(std::uint32_t most_new) {
+  new_ones_left_ = most_new;
+  has_guessed_ = false;
+}
+
+void BlockChunks::guess() {
+  if (new_ones_left_ == 0) throw ChunkIsMissing();
+  has_guessed_ = true;
 }
 
 std::vector<FilePart> BlockChunks::take_missing() {

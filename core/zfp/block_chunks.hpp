@@ -57,6 +57,19 @@ class BlockChunks {
   /// Throws  ChunkIsMissing
   Block block(std::uint64_t block);
 
+  /// Work begins that may need chunks which are not there: the rays of a tile, for example. It may
+  /// go on past some of them, as if its block were empty, and so find what else it may need. What
+  /// it finds is a guess, and no result.
+  ///
+  /// most_new  chunks that it may note as missing before it must stop
+  void begin_guesses(std::uint32_t most_new);
+  /// A chunk is missing, and the work goes on without it.
+  ///
+  /// Throws  ChunkIsMissing: the work must stop
+  void guess();
+  /// Whether the work has guessed.
+  bool has_guessed() const { return has_guessed_; }
+
   /// The chunks that were missed since the last call, in the file's order.
   std::vector<FilePart> take_missing();
   /// A chunk's bytes have come.
@@ -94,6 +107,8 @@ class BlockChunks {
   std::unordered_map<std::uint32_t, Chunk> chunks_{};
   std::unordered_set<std::uint32_t> missing_{};  ///< places in the file
   std::uint64_t bytes_ = 0;
+  std::uint32_t new_ones_left_ = 0;  ///< that the work may note, and go on
+  bool has_guessed_ = false;
 };
 
 }  // namespace isowave::core
