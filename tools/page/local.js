@@ -335,6 +335,7 @@ class LocalScene {
     const [, height] = stage.size;
     if (!isInBands(stage)) return height;
     const share = Math.ceil(height / count / 2);
+    if (this.crew.remote) return share; // rays that wait for parts wait together
     const before = this.msPerRow[stage.stage] ?? this.msPerRow.first * QUARTER;
     return before ? clamp(Math.round(BAND_MS / before), 1, share) : share;
   }

@@ -1,22 +1,26 @@
 // remote.js -- the volume of a page, in a file beside it on a server: the parts that engines lack
 // are asked for by HTTP range requests. A part of an ES module (make_page.py).
 
-const GAP_BYTES = 1 << 14; // between two parts: they are asked for together, and this is not used
-const REQUEST_BYTES = 1 << 20; // of a request, about
-const MOST_REQUESTS = 8; // at a time
+// Between two parts: they are asked for together, and this is not used.
+const LEAST_GAP = 1 << 15;
+const MOST_GAP = 1 << 18;
+const REQUEST_BYTES = 1 << 22; // of a request, about
+const MOST_REQUESTS = 6; // at a time, as many as a browser has connections to a server of HTTP/1.1
+const LATELY = 0.95; // weight of all requests before the last
 const KEPT_BYTES = 256e6; // of parts, which another worker may need, too
 
 /**
  * Neighbours among parts, together.
  * @param {[number, number][]} parts begin and end, in the file's order
+ * @param {number} gap most bytes between two
  * @returns {{begin: number, end: number, parts: [number, number][]}[]}
  */
-function joined(parts) {
+function joined(parts, gap) {
   const runs = [];
   for (const part of parts) {
     const [begin, end] = part;
     const last = runs.at(-1);
-    if (last && begin - last.end <= GAP_BYTES && end - last.begin <= REQUEST_BYTES) {
+    if (last && begin - last.end <= gap && end - last.begin <= REQUEST_BYTES) {
       last.end = end;
       last.parts.push(part);
     } else {
@@ -38,6 +42,8 @@ class RemoteVolume {
     this.keptBytes = 0;
     this.fetchedBytes = 0;
     this.requests = 0;
+    // Of requests lately: least ms until an answer begins, ms in which it is read, its bytes.
+    this.lately = { wait: Infinity, read: 0, bytes: 0 };
     this.waiting = [];
     this.running = 0;
   }
@@ -49,7 +55,7 @@ class RemoteVolume {
   /** @returns {Promise<Uint8Array>} parts of the file one behind the other */
   async get(parts) {
     const isHere = ([begin]) => this.parts.has(begin);
-    for (const run of joined(parts.filter((part) => !isHere(part)))) this.begin(run);
+    for (const run of joined(parts.filter((part) => !isHere(part)), this.gap)) this.begin(run);
     const here = parts.map(([begin]) => {
       const part = this.parts.get(begin);
       this.parts.delete(begin); // to be the last
@@ -64,6 +70,12 @@ class RemoteVolume {
     }
     this.forget();
     return bytes;
+  }
+
+  /** Bytes that take as long to read as a further request takes to be answered. */
+  get gap() {
+    const { wait, read, bytes } = this.lately;
+    return clamp(read > 0 ? wait * bytes / read : 0, LEAST_GAP, MOST_GAP);
   }
 
   /** Asks for parts that are not here. */
@@ -108,8 +120,13 @@ class RemoteVolume {
     ++this.requests;
     let answer;
     let bytes;
+    const begun = performance.now();
+    let answered = begun;
     try {
-      answer = await fetch(this.url, { headers: { Range: `bytes=${begin}-${end - 1}` } });
+      // Chromium asks for parts one after the other that it may keep.
+      answer = await fetch(this.url,
+        { cache: "no-store", headers: { Range: `bytes=${begin}-${end - 1}` } });
+      answered = performance.now();
       if (answer.status === 206) bytes = new Uint8Array(await answer.arrayBuffer());
       else await answer.body?.cancel();
     } catch {
@@ -129,6 +146,9 @@ class RemoteVolume {
       throw new Error(`${this.file} is not the one of this page: load the page again.`);
     }
     this.fetchedBytes += bytes.length;
+    const { wait, read, bytes: before } = this.lately;
+    this.lately = { wait: Math.min(wait / LATELY, answered - begun),
+      read: LATELY * read + performance.now() - answered, bytes: LATELY * before + bytes.length };
     return bytes;
   }
 }
