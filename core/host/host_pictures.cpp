@@ -4,6 +4,7 @@
 
 #include "core/base/error.hpp"
 #include "core/base/parallel_for.hpp"
+#include "core/frame/field_values.hpp"
 #include "core/host/host_renderer.hpp"
 #include "kernels_cl/portable/kept_pixel.h"
 
@@ -48,6 +49,12 @@ void HostRenderer::check_has_picture() const {
 std::vector<HitRecord> HostRenderer::hits() {
   check_has_picture();
   return hits_;
+}
+
+std::optional<std::array<float, 2>> HostRenderer::field_range() {
+  check_has_picture();
+  if (!colors_.empty() && field_) return field_->volume_range();
+  return range_of_values(field_values_);
 }
 
 FrameArrays HostRenderer::fetch(const WantedArrays &wanted, const Appearance &appearance) {

@@ -30,8 +30,7 @@ constexpr std::uint32_t kTileRays = 16;
 /// The same of a volume in chunks: the rays of a tile wait together.
 constexpr std::uint32_t kWaitingTileRays = 8;
 /// Missing chunks that a tile may note before it waits: in a frame's first call, and at most. Each
-/// further call doubles them, for the rays that are left: so few of them wait often, and what is
-/// read in vain is about as much as what is needed.
+/// further call doubles them, so no tile waits often, and few of them read much in vain.
 constexpr std::uint32_t kFirstGuesses = 4, kMostGuesses = 1u << 16;
 /// Tiles of a band for each thread: enough that no thread waits long for the last.
 constexpr std::uint32_t kTilesPerThread = 8;
@@ -503,13 +502,17 @@ void HostRenderer::draw_or_wait(Loop loop, std::uint64_t tile, Draw draw) {
   if (!volume_.chunks) return draw();
   const bool keeps = loop == Loop::kHits && tile < finished_.size();
   if (keeps && finished_[tile] != 0) return;
-  for (BlockChunks *of_level : chunks_) of_level->begin_guesses(guesses_);
+  const auto may_guess = [&](std::uint32_t most) {
+    for (BlockChunks *of_level : chunks_) of_level->begin_guesses(most);
+  };
+  may_guess(guesses_);
   bool is_finished = false;
   try {
     draw();
     is_finished = !has_guessed();
   } catch (const ChunkIsMissing &) {
   }
+  may_guess(0);
   if (!is_finished) any_waits_ = true;
   if (keeps && is_finished) finished_[tile] = 1;
 }
@@ -543,12 +546,6 @@ void HostRenderer::add_field_values(const FrameRequest &request, FrameStats &sta
         return pass;
       });
   stats.field.ms = ms_since(begin);
-}
-
-std::optional<std::array<float, 2>> HostRenderer::field_range() {
-  check_has_picture();
-  if (!colors_.empty() && field_) return field_->volume_range();
-  return range_of_values(field_values_);
 }
 
 void HostRenderer::clear_cache() {

@@ -42,7 +42,7 @@ class RemoteVolume {
     this.keptBytes = 0;
     this.fetchedBytes = 0;
     this.requests = 0;
-    // Of requests lately: least ms until an answer begins, ms in which it is read, its bytes.
+    // Requests lately: least ms until an answer begins, ms in which it is read, its bytes.
     this.lately = { wait: Infinity, read: 0, bytes: 0 };
     this.waiting = [];
     this.running = 0;
