@@ -23,19 +23,29 @@ def run(*options, volume=VOLUME):
     return subprocess.run(map(str, command), capture_output=True, text=True)
 
 
-@pytest.fixture(scope="module")
-def drawn(tmp_path_factory):
+def place(folder):
+    """The volume at another place, by turned axes of which one is mirrored."""
+    turn = np.array([[0.8, 0, 0.6], [0, -1, 0], [-0.6, 0, 0.8]])
+    voxels = np.asarray(isowave.open(VOLUME)).astype(np.uint8)
+    isowave.compress(
+        voxels, exact=True, spacing=(1, 2, 1.5), origin=(30, -20, 500), direction=turn
+    ).save(folder / "placed.zfp")
+    return folder / "placed.zfp"
+
+
+@pytest.fixture(scope="module", params=["as it is", "placed"])
+def drawn(request, tmp_path_factory):
     folder = tmp_path_factory.mktemp("vtk")
+    volume = VOLUME if request.param == "as it is" else place(folder)
     size = "x".join(map(str, SIZE))
-    done = run(
-        "--size", size, "--views", 2, "--rounds", 1, "--pictures", folder, "--json", folder / "p"
-    )
+    options = ("--size", size, "--views", 2, "--rounds", 1)
+    done = run(*options, "--pictures", folder, "--json", folder / "p", volume=volume)
     assert done.returncode == 0, done.stderr
-    return folder, json.loads((folder / "p").read_text())["pareto_peers"]
+    return folder, json.loads((folder / "p").read_text())["pareto_peers"], volume
 
 
 def test_rows_are_those_of_a_peer(drawn):
-    folder, rows = drawn
+    folder, rows, _ = drawn
     assert [row["side"] for row in rows] == ["vtk", "vtk_fine"]
     for row in rows:
         assert set(row["ms"]) == {"new", "next", "warm"} and min(row["ms"].values()) > 0
@@ -44,8 +54,8 @@ def test_rows_are_those_of_a_peer(drawn):
 
 
 def test_pictures_are_those_of_the_library(drawn):
-    folder, rows = drawn
-    volume = isowave.open(VOLUME)
+    folder, rows, volume = drawn
+    volume = isowave.open(volume)
     cameras = isowave.Camera.orbit(volume, 2, size=SIZE)
     own = [volume.render(ISOVALUE, camera=camera, size=SIZE).rgb for camera in cameras]
     errors = {}
