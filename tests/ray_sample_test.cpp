@@ -246,7 +246,7 @@ TEST(RaySample, SilhouettesMayMoveAcrossTheRay) {
   constexpr std::uint32_t kSide = 200;
   const glm::dvec3 center(0, 0, -100);
   const double radius = 35;
-  for (const double limit : {0.5, 1.0, 2.0, 4.0}) {
+  for (const double limit : {0.5, 2.0}) {
     const double pixel = pixel_size_at(camera, kSide, 100), error = limit * pixel;
     const std::vector truth = frames_of_ball(camera, kSide, limit, center, radius);
     const auto share_of = [&](const glm::dvec3 &at, double with_radius) {
@@ -333,7 +333,7 @@ double share_of_frame(Renderer &renderer, const FrameRequest &request, const Det
 TEST(RaySample, PromiseHoldsInRandomScenes) {
   constexpr ImageSize kSize{320, 240};
   ASSERT_GT(sample_of(kSize).stride, 1u);
-  const int num_volumes = std::getenv("ISOWAVE_LONG_TESTS") != nullptr ? 10 : 2;
+  const int num_volumes = std::getenv("ISOWAVE_LONG_TESTS") != nullptr ? 10 : 1;
   int num_kept = 0, num_coarse = 0, num_lost_always = 0;
   Random random{std::mt19937(1)};
   for (int volumes = 0; volumes < num_volumes; ++volumes) {
