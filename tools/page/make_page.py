@@ -3,14 +3,17 @@
 
 The page has the viewer's front end (folder VIEWER), the engine, and places for what isowave's
 save_page() puts in: @ISOWAVE_CONNECT@, @ISOWAVE_TITLE@, @ISOWAVE_POSTER@, @ISOWAVE_SCENE@,
-@ISOWAVE_VOLUME@.
+@ISOWAVE_VOLUME@. If advdef is installed (apt install advancecomp), the engine becomes 5 % smaller.
 """
 
 import base64
 import gzip
 import hashlib
 import runpy
+import shutil
+import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
@@ -24,6 +27,18 @@ def script(viewer: Path) -> str:
     return "\n" + "\n".join(file.read_text(encoding="utf-8") for file in files)
 
 
+def packed_by_gzip(data: bytes) -> bytes:
+    packed = gzip.compress(data, 9, mtime=0)
+    advdef = shutil.which("advdef")
+    if not advdef:
+        return packed
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "engine.gz")
+        path.write_bytes(packed)
+        subprocess.run([advdef, "-z", "-4", "-q", path], check=True)
+        return path.read_bytes()
+
+
 def main() -> None:
     glue, module, viewer, out = map(Path, sys.argv[1:])
     code = glue.read_text(encoding="utf-8") + "\n" + (HERE / "worker.js").read_text()
@@ -31,7 +46,7 @@ def main() -> None:
     for text in (code, view):
         if "</script" in text.lower():
             sys.exit("make_page: a script holds the end of its element")
-    packed = gzip.compress(module.read_bytes(), 9, mtime=0)
+    packed = packed_by_gzip(module.read_bytes())
     values = {
         "LICENCES": (HERE / "notices.txt").read_text().strip(),
         "HASH": base64.b64encode(hashlib.sha256(view.encode()).digest()).decode(),
