@@ -138,8 +138,9 @@ std::vector<glm::dvec3> as_seen(const Planes &picture, double pixels_per_degree)
   std::vector<glm::dvec3> result(picture[0].values.size(), glm::dvec3(0));
   glm::dvec3 total(0);
   for (int channel = 0; channel < 3; ++channel) {
-    for (const auto &[a, b] : kSensitivity[std::size_t(channel)]) {
-      const Weights gauss = sampled(radius, [&, b = b](double x) {
+    for (const Gaussian &of : kSensitivity[std::size_t(channel)]) {
+      const double a = of.a, b = of.b;
+      const Weights gauss = sampled(radius, [&](double x) {
         return std::exp(-kPi * kPi * x * x / (b * pixels_per_degree * pixels_per_degree));
       });
       const double sum = std::accumulate(gauss.begin(), gauss.end(), 0.0),

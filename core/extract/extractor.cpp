@@ -183,7 +183,8 @@ void Extractor::give(Run &run, std::uint32_t begin) {
   std::vector<Triangle> triangles(num_triangles);
   const auto each = [&](std::size_t count, const auto &work) {
     parallel_for((count + kAtOnce - 1) / kAtOnce, 0, [&](std::uint64_t piece, std::uint32_t) {
-      for (std::size_t i = piece * kAtOnce; i < std::min(count, (piece + 1) * kAtOnce); ++i)
+      for (std::size_t i = piece * kAtOnce; i < std::min<std::size_t>(count, (piece + 1) * kAtOnce);
+           ++i)
         work(i);
     });
   };

@@ -453,8 +453,8 @@ std::vector<HitRecord> DeviceRenderer::cast_rays(std::span<const WorldRay> world
   std::vector<HitRecord> hits, part;
   while (hits.size() < rays.size()) {
     const std::size_t num_left = rays.size() - hits.size(),
-                      num_rows = std::min((num_left + columns - 1) / columns,
-                                          wavefront.num_rays / columns);
+                      num_rows = std::min<std::size_t>((num_left + columns - 1) / columns,
+                                                       wavefront.num_rays / columns);
     const std::span of_part =
         std::span(rays).subspan(hits.size(), std::min(num_left, num_rows * columns));
     std::vector<GivenRay> given(num_rows * columns);
