@@ -251,7 +251,13 @@ WAYS_OF_LARGE_VOLUMES = (
 )
 
 
-def drawn_by_others(run, volume, isovalue, options):
+WAYS_BESIDE_VTK = (
+    "default,--samples 2,--samples 4,--samples 8,1/2 size,1/4 size,1/8 size,BCMC,"
+    "--device host,--device host --samples 2,--device host --samples 4"
+)
+
+
+def drawn_by_others(run, volume, isovalue, options, with_vtk=False):
     """Draws a volume with the peers' programs that are there: names of JSON files for --peers."""
     is_large = "ways" in options  # floats of the largest would not fit
     sides = "texture_uint8" if is_large else "texture_uint8,nanovdb_float_ranges,nanovdb_fpn_ranges"
@@ -267,7 +273,7 @@ def drawn_by_others(run, volume, isovalue, options):
     if (run.options.programs / program).exists():
         run.run(program, *arguments, **shown, **chosen)
         others += run.read_json("peers/p.json")["pareto_peers"]
-    if run.options.python and not is_large:
+    if with_vtk:
         name = str(volume)
         if name.startswith("generate:"):  # the package reads files
             name = run.volume(name[9:].removesuffix("_uint8"), "--exact")
@@ -280,7 +286,7 @@ def drawn_by_others(run, volume, isovalue, options):
     return {"peers": "peers/others.json"}
 
 
-def drawn_in_every_way(run, subjects, **options):
+def drawn_in_every_way(run, subjects, with_vtk=False, **options):
     """Rows of (volume, isovalue): what `isowave bench pareto` writes of it, and of peers."""
     rows = []
     for volume, isovalue in subjects:
@@ -291,7 +297,7 @@ def drawn_in_every_way(run, subjects, **options):
             volume,
             isovalue=isovalue,
             **options,
-            **drawn_by_others(run, volume, isovalue, options),
+            **drawn_by_others(run, volume, isovalue, options, with_vtk),
             device=run.options.device,
             json="o.json",
         )
@@ -309,6 +315,22 @@ def pareto(run):
     subjects += [(f"generate:{field}_uint8", 128) for field in fields]
     size = "640x360" if run.options.on_cpu else "1280x720"
     return drawn_in_every_way(run, subjects, size=size, views=3, rounds=3)
+
+
+def vtk(run):
+    """The same in fewer ways, beside VTK's isosurface mapper, which is slow on a CPU."""
+    subjects = [(path, isovalues[0]) for path, isovalues in run.real_volumes("LIDC2")]
+    subjects += [(path, isovalues[1]) for path, isovalues in run.real_volumes("bonsai")]
+    if run.options.quick:
+        ways = "default,--device host"
+        return drawn_in_every_way(
+            run, subjects[:1], with_vtk=True, size="48x32", views=1, rounds=1, ways=ways
+        )
+    field = (CPU_VOLUMES if run.options.on_cpu else GPU_VOLUMES)[0]
+    subjects += [(f"generate:{field}_uint8", 128)]
+    size = "640x360" if run.options.on_cpu else "1280x720"
+    ways = WAYS_BESIDE_VTK
+    return drawn_in_every_way(run, subjects, with_vtk=True, size=size, views=1, rounds=3, ways=ways)
 
 
 def pareto_large(run):

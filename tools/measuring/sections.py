@@ -35,10 +35,21 @@ SECTIONS = {
         accuracy.solvers,
         accuracy.pareto,
         accuracy.pareto_large,
+        accuracy.vtk,
         accuracy.topology,
     )
 }
-NEED_VOLUMES = ("bits", "oracles", "certified", "sizes", "detail", "solvers", "pareto", "topology")
+NEED_VOLUMES = (
+    "bits",
+    "oracles",
+    "certified",
+    "sizes",
+    "detail",
+    "solvers",
+    "pareto",
+    "topology",
+    "vtk",
+)
 # What some need beside isowave, frame_bench and isowave_bench: built only with VTK, with CUDA, with
 # MPI, or with tests.
 PROGRAMS = {

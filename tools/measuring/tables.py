@@ -468,6 +468,10 @@ def pareto_ways(rows):
         )
 
 
+def vtk(rows):
+    yield from pareto_ways(rows)
+
+
 def pareto_spans(rows):
     """The factors from one end of a front to the other, of time and FLIP, and of wrong pixels."""
     yield "volume, isovalue", "time", "FLIP", "wrong pixels"
