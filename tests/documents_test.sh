@@ -162,9 +162,10 @@ refused() {
 }
 refused 'an unknown section' --only frames,tides
 refused 'a missing folder' --only sizes --volumes "$work/none"
-for section in bits oracles certified sizes detail solvers pareto topology; do
+for section in bits oracles certified sizes detail solvers pareto topology vtk; do
   refused "$section without volumes" --only "$section"
 done
+refused 'VTK without its Python' --only vtk --volumes "$top/tests/data"
 mkdir -p "$work/others/bench"
 for program in isowave bench/frame_bench bench/isowave_bench; do
   ln -s "$programs/$program" "$work/others/$program"

@@ -554,6 +554,7 @@ TABLES = {
         ("pareto", pareto, pareto_ways, pareto_spans),
         ("pareto_large", pareto_large, pareto_large_ways, pareto_large_spans),
         ("topology", topology),
+        ("vtk", vtk),
     )
     for table in tables
 }

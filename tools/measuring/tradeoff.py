@@ -37,6 +37,7 @@ def name_of(point):
         .replace("--device host", "host")
         .replace(" --", ",\n")
         .replace(" + ", " +\n")
+        .replace("VTK, steps ", "VTK, steps\n")
         .replace("--", "")
     )
     return name.removesuffix(", ranges").removesuffix(" of 8 bits")
@@ -69,17 +70,22 @@ def spread_names(axis, front, cost, error):
 
 
 def name_beside(axis, point, cost, error, color, above):
-    """To the right, or to the left of points near the panel's right end."""
+    """To the right, or to the left of points near the panel's right end.
+
+    above: points; with several lines, to their nearest
+    """
     at = axis.transAxes.inverted().transform(axis.transData.transform((point[cost], point[error])))
-    is_left = at[0] > 0.8
+    name = name_of(point)
+    is_left = at[0] + 0.018 * max(map(len, name.split("\n"))) > 1
     axis.annotate(
-        name_of(point),
+        name,
         (point[cost], point[error]),
-        xytext=(-3 if is_left else 3, above),
+        xytext=(-3 if is_left else 3, above if "\n" not in name else above / 3),
         textcoords="offset points",
         ha="right" if is_left else "left",
         fontsize=NAME_POINTS,
-        va="center",
+        linespacing=1.0,
+        va="center" if "\n" not in name else "bottom" if above > 0 else "top",
         color=color,
         path_effects=HALO,
         zorder=5,
@@ -97,10 +103,12 @@ def draw_panel(axis, document, cost, error, least):
     for point in points:
         if not point["is_peer"] and point["way"] not in names:
             axis.plot(point[cost], point[error], "o", color=OTHERS, markersize=3)
-    for number, point in enumerate(sorted(peers, key=lambda point: point[cost])):
+    for point in peers:
         axis.plot(point[cost], point[error], "s", color=PEERS, markersize=4, zorder=3)
-        if point["way"] not in names:  # by turns above and below
-            name_beside(axis, point, cost, error, PEERS, 9 if number % 2 == 0 else -9)
+    beside = [point for point in peers if point["way"] not in names]
+    beside.sort(key=lambda point: point[error], reverse=True)
+    for number, point in enumerate(beside):  # by turns above and below
+        name_beside(axis, point, cost, error, PEERS, 9 if number % 2 == 0 else -9)
     for point in points:
         if point["way"] == "default" and "default" not in names:
             axis.plot(point[cost], point[error], "o", color=DEFAULT, markersize=4, zorder=4)

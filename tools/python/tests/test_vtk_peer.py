@@ -1,6 +1,7 @@
 """VTK's isosurface mapper as a peer: it draws our surface, in our colours."""
 
 import json
+import os
 import pathlib
 import subprocess
 import sys
@@ -64,6 +65,23 @@ def test_pictures_are_those_of_the_library(drawn):
         errors[row["side"]] = np.mean(np.abs(np.subtract(pictures, own, dtype=float)))
     other_view = np.mean(np.abs(np.subtract(own[0], own[1], dtype=float)))
     assert errors["vtk_fine"] < errors["vtk"] < other_view / 4, (errors, other_view)
+
+
+def test_it_is_measured_beside_our_ways_to_draw(tmp_path):
+    programs = pathlib.Path(os.environ.get("ISOWAVE_PROGRAM", TOP / "build/release/isowave")).parent
+    if not (programs / "bench/isowave_bench").exists():
+        pytest.skip("tools/measure needs bench/, which was not built")
+    device = os.environ.get("ISOWAVE_DEVICE", "cpu")
+    command = [TOP / "tools/measure", "--quick", "--only", "vtk", "--device", device]
+    command += ["--volumes", VOLUME.parent, "--python", sys.executable, "--programs", programs]
+    done = subprocess.run(
+        [*map(str, command), "-o", str(tmp_path / "m.json")], capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    (row,) = json.loads((tmp_path / "m.json").read_text())["sections"]["vtk"]["rows"]
+    errors = {point["way"]: point["flip"] for point in row["points"]}
+    assert errors["VTK, steps of 0.1 voxel"] < errors["VTK, steps of a voxel"]
+    assert errors["default"] == errors["--device host"] < errors["VTK, steps of 0.1 voxel"]
 
 
 @pytest.mark.parametrize(
