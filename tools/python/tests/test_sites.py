@@ -105,7 +105,8 @@ def test_a_page_reads_what_rays_come_to(
         volume = site.parent / "volume.zfp"
         assert np.array_equal(shown(page), drawn_by_program(page, volume, tmp_path))
         total = (site / "volume.chunks").stat().st_size
-        assert sum(server.sent) < total / 8
+        # What lies between parts is read with them if the server answers slowly.
+        assert sum(server.sent) < total / 2
         keep(page, "page_of_a_site")
         # What was read is not read again.
         before = len(server.sent)

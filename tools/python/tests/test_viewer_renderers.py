@@ -118,7 +118,7 @@ def test_on_a_machine_without_a_gpu_the_host_draws_all_of_a_wish() -> None:
     assert [h["state"] for h in eye.of_type("status")] == ["ready"]
     status = eye.of_type("status")[-1]
     assert (status["device"], status["device_memory"], status["notice"]) == ("host", None, "")
-    eye.wish(80.0, size=(1600, 1200), ambient=2, max_error=0.5, time_budget=5.0)
+    eye.wish(80.0, size=(1600, 1200), ambient=2, max_surface_error=0.5, time_budget=5.0)
     run(scene)
     clock.now += REST_SECONDS
     run(scene)

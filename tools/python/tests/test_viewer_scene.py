@@ -343,7 +343,7 @@ def test_a_time_budget_needs_no_first_picture() -> None:
         (f.size, f.request.time_budget, f.request.max_surface_error) for f in volume.frames
     ] == [((64, 48), 0.05, None)]
     eye.ack()
-    eye.wish(80.0, max_error=0.5)
+    eye.wish(80.0, max_surface_error=0.5)
     run(scene)
     assert (volume.frames[-1].request.time_budget, volume.frames[-1].request.max_surface_error) == (
         None,
