@@ -180,6 +180,27 @@ TEST(BlockChunks, LayersAndCapsHaveTheBitsOfTheWholeVolume) {
             0);
 }
 
+/// Light is kept for the tiles that have theirs, and so are layers that are blended again.
+TEST(BlockChunks, LightThatBouncesHasTheBitsOfTheWholeVolume) {
+  const CompressedVolume volume = std::move(volumes()[1]);
+  for (const bool has_layers : {false, true}) {
+    Remote remote(volume);
+    HostRenderer whole(volume, {.num_threads = 1}), renderer(remote.here, {.num_threads = 1});
+    FrameRequest request{.camera = orbit_cameras(volume.info, 3)[1],
+                         .isovalue = 0.3f,
+                         .size = kSize,
+                         .ambient_rays = 4};
+    request.bounce_rays = 4;
+    request.light.towards_light = glm::dvec3(0.3, 0.5, 1);
+    if (has_layers) request.surfaces = {{0.3f, {1, 0, 0}, 0.4f}, {-0.5f, {0, 1, 0}, 1}};
+    whole.render(request);
+    EXPECT_GT(draw(renderer, remote, request).passes, 2u);
+    const WantedArrays wanted{.picture = true};
+    const FrameArrays expected = whole.fetch(wanted, {}), got = renderer.fetch(wanted, {});
+    EXPECT_TRUE(std::ranges::equal(got.picture, expected.picture)) << has_layers;
+  }
+}
+
 TEST(BlockChunks, AFrameGoesOnWithoutWhatWasDropped) {
   const CompressedVolume volume = std::move(volumes()[0]);
   Remote remote(volume);

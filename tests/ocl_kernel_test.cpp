@@ -189,7 +189,7 @@ TEST_P(OclKernelOnDevice, Ranges) {
   EXPECT_EQ(Range::strided(0, 64, device_).num_groups, 0u);
   EXPECT_EQ(Range::strided(65, 64, device_).num_groups, 2u);
   EXPECT_EQ(Range::strided(1u << 30, 64, device_).num_groups, device_.max_resident_groups());
-  const bool is_gpu = device_.info().type == DeviceType::kGpu;
+  const bool is_gpu = device_.info().type == ocl::DeviceType::kGpu;
   EXPECT_EQ(Range::each(65, 64, device_).num_groups, 2u);
   EXPECT_EQ(Range::each(1u << 30, 64, device_).num_groups,
             is_gpu ? device_.max_resident_groups() : 1u << 24);

@@ -34,8 +34,6 @@ constexpr std::uint32_t kWaitingTileRays = 8;
 constexpr std::uint32_t kFirstGuesses = 4, kMostGuesses = 1u << 16;
 /// Tiles of a band for each thread: enough that no thread waits long for the last.
 constexpr std::uint32_t kTilesPerThread = 8;
-/// Rays of any origin that a thread takes at a time.
-constexpr std::uint32_t kRunRays = 1024;
 
 std::uint64_t mebibytes(std::uint64_t bytes) {
   return (bytes + (1u << 20) - 1) >> 20;
@@ -161,9 +159,13 @@ void HostRenderer::draw_picture(const FrameParams &frame, ImageSize size,
                                 std::vector<RayColor> colors, Draw draw) {
   frame_ = frame;
   size_ = size;
-  open_ = {};
-  field_values_.clear();
-  if (!goes_on_) colors_ = std::move(colors);
+  if (!goes_on_) {
+    open_ = {};
+    field_values_.clear();
+    layers_.clear();
+    colors_ = std::move(colors);
+    for (std::vector<std::uint8_t> &tiles : finished_) tiles.clear();
+  }
   try {
     draw();
   } catch (...) {
@@ -270,7 +272,6 @@ void HostRenderer::draw_surfaces(const FrameRequest &request, std::span<const Fr
       clip_levels(surfaces[k], by.clip, frames[stats.first_level].screen);
   }
   std::mutex mutex;
-  LayerHits layers(light_rays.bounces ? ISO_MAX_LAYERS : 0);
   const auto draw_tile = [&](const RayTile &tile, bool is_alone) {
     const std::uint32_t columns = tile.end_x - tile.begin_x,
                         num_rays = columns * (tile.end_y - tile.begin_y);
@@ -284,32 +285,33 @@ void HostRenderer::draw_surfaces(const FrameRequest &request, std::span<const Fr
       }
     }
     LayerStats of_tile;
-    LayerHits layers_of_tile(layers.size());
+    LayerHits layers_of_tile(layers_.size());
     const auto blend = is_alone ? host_loops().blend_rays : host_loops().blend;
-    const std::uint64_t num_hits = blend(
-        surfaces, by, tile, next.data(),
-        {hits_.data(), colors_.data(), &of_tile, layers.empty() ? nullptr : layers_of_tile.data()});
+    const std::uint64_t num_hits = blend(surfaces, by, tile, next.data(),
+                                         {hits_.data(), colors_.data(), &of_tile,
+                                          layers_.empty() ? nullptr : layers_of_tile.data()});
     if (has_guessed()) return num_hits;
     const std::scoped_lock lock(mutex);
     stats.layers.add(of_tile);
-    for (std::size_t layer = 0; layer < layers.size(); ++layer)
-      layers[layer].insert(layers[layer].end(), layers_of_tile[layer].begin(),
-                           layers_of_tile[layer].end());
+    for (std::size_t layer = 0; layer < layers_.size(); ++layer)
+      layers_[layer].insert(layers_[layer].end(), layers_of_tile[layer].begin(),
+                            layers_of_tile[layer].end());
     return num_hits;
   };
   draw_picture(frame, size, std::vector<RayColor>(size.num_rays(), clear_ray()), [&] {
+    if (layers_.empty() && light_rays.bounces) layers_.resize(ISO_MAX_LAYERS);
     draw_bands(request, draw_tile, stats);
-    if (light_rays.bounces && !stats.cancelled) blend_bounced(frame, by, layers);
+    if (light_rays.bounces && !stats.cancelled) blend_bounced(frame, by);
+    if (!stats.cancelled) layers_.clear();
   });
 }
 
 /// Blends all layers again, with the light that ambient rays have brought to them, filtered.
-void HostRenderer::blend_bounced(const FrameParams &frame, const LayerBlend &by,
-                                 const LayerHits &layers) {
+void HostRenderer::blend_bounced(const FrameParams &frame, const LayerBlend &by) {
   constexpr std::size_t kRun = 4096;
   const std::size_t num_rays = hits_.size();
   std::ranges::fill(colors_, clear_ray());
-  for (const std::vector<LayerHit> &layer : layers) {
+  for (const std::vector<LayerHit> &layer : layers_) {
     if (layer.empty()) break;
     std::vector<HitRecord> hits(num_rays, no_hit());
     std::array<std::vector<float>, ISO_LAYER_SUMS> parts;
@@ -358,7 +360,8 @@ std::uint64_t HostRenderer::trace(std::span<const HostLevel> drawing, const RayT
 template <class DrawTile>
 void HostRenderer::draw_bands(const FrameRequest &request, DrawTile draw_tile, FrameStats &stats) {
   const std::size_t num_rays = std::size_t{frame_.view.width} * frame_.view.height;
-  if (request.surfaces.empty() && request.field_values) field_values_.assign(num_rays, no_value());
+  if (request.surfaces.empty() && request.field_values && field_values_.empty())
+    field_values_.assign(num_rays, no_value());
   if (request.on_pass) {
     hits_.assign(num_rays, no_hit());
   } else {
@@ -386,6 +389,18 @@ void HostRenderer::draw_bands(const FrameRequest &request, DrawTile draw_tile, F
       });
 }
 
+/// All light gets to all hits.
+void HostRenderer::begin_light(const LightRays &light_rays) {
+  open_ = {{}, light_rays.num_ambient, light_rays.num_shadow};
+  if (light_rays.bounces) {
+    open_.bounced.assign(hits_.size(), 0.0f);
+    open_.num_bounced = light_rays.num_ambient;
+  }
+  open_.counts.assign(hits_.size(), static_cast<uchar>(light_rays.num_ambient));
+  if (light_rays.num_shadow != 0)
+    open_.counts.resize(2 * hits_.size(), static_cast<uchar>(light_rays.num_shadow));
+}
+
 /// All rays of each hit at once: bands that are not there yet show all of the sky. Each ray stays
 /// in the level of detail of its hit.
 void HostRenderer::add_ambient(const FrameRequest &request, std::span<const HostLevel> drawing,
@@ -396,14 +411,7 @@ void HostRenderer::add_ambient(const FrameRequest &request, std::span<const Host
   const AmbientParams params =
       make_ambient_params(levels_.infos()[stats.first_level], light_rays.num_ambient);
   const FrameParams &seen = drawing.front().frame;
-  open_ = {{}, light_rays.num_ambient, light_rays.num_shadow};
-  if (light_rays.bounces) {
-    open_.bounced.assign(hits_.size(), 0.0f);
-    open_.num_bounced = light_rays.num_ambient;
-  }
-  open_.counts.assign(hits_.size(), static_cast<uchar>(light_rays.num_ambient));
-  if (light_rays.num_shadow != 0)
-    open_.counts.resize(2 * hits_.size(), static_cast<uchar>(light_rays.num_shadow));
+  if (open_.counts.empty()) begin_light(light_rays);  // or the tiles that are finished have theirs
   stats.cancelled = !for_bands(
       request, Loop::kLight,
       [&](const RayTile &tile, bool) {
@@ -472,8 +480,8 @@ bool HostRenderer::for_bands(const FrameRequest &request, Loop loop, Draw draw, 
   const std::uint32_t band =
       on_pass ? tile_rows * rounded_up(kTilesPerThread * thread_count(num_threads_), columns)
               : rows - begin_row;
-  if (volume_.chunks && loop == Loop::kHits && !goes_on_)
-    finished_.assign(std::size_t{columns} * rounded_up(rows - begin_row, tile_rows), 0);
+  if (volume_.chunks && finished_[own].empty())
+    finished_[own].assign(std::size_t{columns} * rounded_up(rows - begin_row, tile_rows), 0);
   for (std::uint32_t row = begin_row; row < rows; row += band) {
     const std::uint32_t end_row = std::min(rows - row, band) + row;
     levels_.room().run(
@@ -500,21 +508,19 @@ bool HostRenderer::for_bands(const FrameRequest &request, Loop loop, Draw draw, 
 template <class Draw>
 void HostRenderer::draw_or_wait(Loop loop, std::uint64_t tile, Draw draw) {
   if (!volume_.chunks) return draw();
-  const bool keeps = loop == Loop::kHits && tile < finished_.size();
-  if (keeps && finished_[tile] != 0) return;
+  std::uint8_t &finished = finished_[static_cast<std::size_t>(loop)][tile];
+  if (finished != 0) return;
   const auto may_guess = [&](std::uint32_t most) {
     for (BlockChunks *of_level : chunks_) of_level->begin_guesses(most);
   };
   may_guess(guesses_);
-  bool is_finished = false;
   try {
     draw();
-    is_finished = !has_guessed();
+    finished = has_guessed() ? 0 : 1;
   } catch (const ChunkIsMissing &) {
   }
   may_guess(0);
-  if (!is_finished) any_waits_ = true;
-  if (keeps && is_finished) finished_[tile] = 1;
+  if (finished == 0) any_waits_ = true;
 }
 
 /// Whether the tile that is drawn has gone past chunks that are not there.
@@ -551,41 +557,6 @@ void HostRenderer::add_field_values(const FrameRequest &request, FrameStats &sta
 void HostRenderer::clear_cache() {
   levels_.forget();
   if (field_) field_->forget();
-}
-
-std::vector<HitRecord> HostRenderer::cast_rays(std::span<const WorldRay> rays, float isovalue,
-                                               Normals normals) {
-  if (std::isnan(isovalue)) throw Error("the isovalue is NaN: give a number");
-  const std::vector<IndexRay> index_rays = make_index_rays(info_, rays);
-  FrameParams frame = make_grid_params(info_);
-  frame.view.t_scale = 1;
-  HostBlocks &blocks = levels_.open_finest(isovalue);
-  frame.surface = blocks.surface();
-  std::vector<HitRecord> hits(rays.size(), no_hit());
-  const HostField field = blocks.field();
-  blocks.run(rounded_up(rays.size(), kRunRays), [&](std::uint64_t run, bool) {
-    const std::size_t begin = run * kRunRays;
-    host_loops().cast(frame, field, index_rays.data() + begin,
-                      static_cast<uint>(std::min<std::size_t>(kRunRays, rays.size() - begin)),
-                      normals == Normals::kSmooth, hits.data() + begin);
-  });
-  return hits;
-}
-
-Camera HostRenderer::camera(std::span<const float> isovalues, std::optional<ImageSize> size,
-                            const Viewpoint &from) {
-  const ImageSize of_picture = size.value_or(abilities().largest);
-  check_image_size(of_picture);
-  std::optional<BlockBox> box;
-  for (const float isovalue : isovalues) {
-    if (std::isnan(isovalue)) throw Error("the isovalue is NaN: give a number");
-    const std::optional<BlockBox> blocks = levels_.finest().rounded_box(isovalue);
-    if (!blocks) continue;
-    if (!box) box = blocks;
-    box->begin = glm::min(box->begin, blocks->begin);
-    box->end = glm::max(box->end, blocks->end);
-  }
-  return surface_camera(info_, box, of_picture, from);
 }
 
 Camera HostRenderer::label_camera(std::span<const std::uint16_t> labels,

@@ -20,6 +20,8 @@
 
 namespace isowave::core {
 
+struct LightRays;
+
 struct HostRendererOptions {
   /// Bound on value ranges and decoded blocks [bytes]; 0: a quarter of the host's memory. Frames
   /// have the same bits with any limit. If a frame's blocks do not fit, they are dropped and
@@ -118,6 +120,7 @@ class HostRenderer : public Renderer {
   template <class DrawTile>
   void draw_bands(const FrameRequest &request, DrawTile draw_tile, FrameStats &stats);
   void add_field_values(const FrameRequest &request, FrameStats &stats);
+  void begin_light(const LightRays &light_rays);
   void add_ambient(const FrameRequest &request, std::span<const HostLevel> drawing,
                    FrameStats &stats);
   std::vector<GivenRay> places_of(const FrameParams &frame, const AmbientParams &params,
@@ -125,7 +128,7 @@ class HostRenderer : public Renderer {
   void filter_bounced(const View &view, std::span<const GivenRay> places,
                       std::vector<float> &light) const;
   using LayerHits = std::vector<std::vector<LayerHit>>;  ///< [layer] of all rays
-  void blend_bounced(const FrameParams &frame, const LayerBlend &by, const LayerHits &layers);
+  void blend_bounced(const FrameParams &frame, const LayerBlend &by);
   template <class Draw, class After>
   bool for_bands(const FrameRequest &request, Loop loop, Draw draw, After after);
   /// The rows of rays that are drawn: from, to.
@@ -145,8 +148,9 @@ class HostRenderer : public Renderer {
   std::vector<BlockChunks *> chunks_{};        ///< of all levels of detail that have some
   std::uint32_t guesses_ = 0;  ///< missing chunks that a tile may note before it waits
   bool goes_on_ = false;
-  std::atomic<bool> any_waits_ = false;  ///< a tile of the frame, for chunks
-  std::vector<std::uint8_t> finished_;   ///< [tile] of a volume in chunks
+  std::atomic<bool> any_waits_ = false;                ///< a tile of the frame, for chunks
+  std::array<std::vector<std::uint8_t>, 3> finished_;  ///< [Loop][tile] of a volume in chunks
+  LayerHits layers_;                                   ///< that are blended again; else empty
   std::vector<HitRecord> hits_;
   OpenCounts open_;
   std::vector<RayColor> colors_;          ///< of a frame of several or translucent surfaces

@@ -22,8 +22,7 @@ class HitPositions {
   /// Out  positions: double [count][3]
   void operator()(const HitMap &map, uint begin, uint count, const ocl::Buffer<HitRecord> &hits,
                   ocl::Buffer<std::byte> &positions) {
-    kernel_(ocl::Range::each(count, ocl::kGroupSize, device_), map, begin, count, hits,
-            positions);
+    kernel_(ocl::Range::each(count, ocl::kGroupSize, device_), map, begin, count, hits, positions);
   }
 
  private:

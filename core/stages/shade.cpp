@@ -97,9 +97,7 @@ FrameArrays Shade::operator()(const WantedArrays &wanted, const Shading &shading
                               Wavefront &rays, const ocl::Buffer<RayColor> *layers,
                               std::uint32_t samples) {
   const std::size_t num_rays = std::size_t{rays.frame.view.width} * rays.frame.view.height;
-  const auto range = [&](uint count) {
-    return ocl::Range::each(count, ocl::kGroupSize, device_);
-  };
+  const auto range = [&](uint count) { return ocl::Range::each(count, ocl::kGroupSize, device_); };
   ocl::InFlight<FrameArrays> arrays(device_);
   if (wanted.picture) shade(shading, rays, layers, samples, arrays->picture);
   if (wanted.depth) {
