@@ -41,7 +41,10 @@ print(isowave.Report())
 END
 fuel=$source/tests/data/fuel_64x33x32_uint8.raw.gz
 aarch64=$source/build/aarch64
-# The package has its libraries, but for those of every Linux, OpenCL's loader and numpy.
+# The package has its libraries, but for those of every Linux, OpenCL's loader and numpy. Debian's
+# numpy finds these by links that its packages would make when they are installed.
+libraries=/usr/lib/aarch64-linux-gnu
+export QEMU_SET_ENV=LD_LIBRARY_PATH=$libraries/blas:$libraries/lapack
 PYTHONPATH=$work/package quietly "$aarch64/run" "$aarch64"/root/usr/bin/python3 "$work/draw.py" \
   "$fuel" "$work/there.png" "$work/there.zfp"
 grep -q aarch64 "$work/log" || { cat "$work/log"; fail 'the report names another processor'; }
