@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from browser_pages import FIREFOX, ROOT, browser, keep, menu, open_page
+from browser_pages import FIREFOX, ROOT, browser, keep, menu, open_page, type_into
 from PIL import Image
 from viewer_fakes import FakeVolume
 from viewer_scenes import Clock, make_scene
@@ -134,7 +134,8 @@ def test_the_page_has_the_programs_bits_and_asks_no_server(
     assert page.locator("#poster").count() == 0
     assert page.problems == []
     assert {url.split(":")[0] for url in page.requested} <= {"file", "data", "blob"}
-    assert [url for url in page.requested if url.startswith("file")] == [html.as_uri()]
+    # Firefox does not tell of the page itself.
+    assert {url for url in page.requested if url.startswith("file")} <= {html.as_uri()}
     keep(page, "page_to_share")
 
 
@@ -154,7 +155,7 @@ def test_drags_isovalues_and_rays_are_drawn(
     stages = [p["stage"] for p in page.evaluate("window.shownPictures")]
     assert stages[0] == "first" and stages[-1] == "lossless"
     number = page.locator("[name=isovalue]")
-    number.fill("60")
+    type_into(number, "60")
     number.press("Enter")
     rests(page)
     assert state(page)["iso"] == "60"
@@ -206,6 +207,7 @@ def test_what_is_under_the_cursor(open_page: Callable[..., Any], html: Path) -> 
     assert float(text.split(" · ")[-1]) == pytest.approx(10, abs=0.01)
 
 
+@pytest.mark.skipif(FIREFOX, reason="WebDriver BiDi cannot switch Firefox's JavaScript off")
 def test_the_poster_shows_without_javascript(
     open_page: Callable[..., Any], html: Path, volume: isowave.Volume
 ) -> None:
@@ -308,7 +310,7 @@ def test_the_engine_is_small_and_evaluates_no_texts() -> None:
     assert "eval(" not in page and "new Function" not in page
     engine = re.search(r'id="module">([^<]*)<', page)[1]  # type: ignore[index]
     code = re.search(r'id="code">(.*?)</script>', page, re.DOTALL)[1]  # type: ignore[index]
-    assert len(base64.b64decode(engine)) + len(gzip.compress(code.encode())) <= 430_000
+    assert len(base64.b64decode(engine)) + len(gzip.compress(code.encode())) <= 406_000
 
 
 def test_pages_are_written_by_the_server() -> None:
