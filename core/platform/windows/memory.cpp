@@ -28,7 +28,7 @@ Taken &taken() {
   return all;
 }
 
-void *at(std::uintptr_t address) {
+void *pointer_to(std::uintptr_t address) {
   return reinterpret_cast<void *>(address);
 }
 
@@ -45,7 +45,7 @@ LONG CALLBACK provide_page(EXCEPTION_POINTERS *exception) {
     return EXCEPTION_CONTINUE_SEARCH;
   const std::uintptr_t page = address / kPageBytes * kPageBytes,
                        end = std::min(page + kPageBytes, std::prev(next)->second);
-  return ::VirtualAlloc(at(page), end - page, MEM_COMMIT, PAGE_READWRITE) != nullptr
+  return ::VirtualAlloc(pointer_to(page), end - page, MEM_COMMIT, PAGE_READWRITE) != nullptr
              ? EXCEPTION_CONTINUE_EXECUTION
              : EXCEPTION_CONTINUE_SEARCH;
 }
