@@ -25,7 +25,7 @@ def run(*options, volume=VOLUME):
 
 
 def place(folder):
-    """The volume at another place, by turned axes of which one is mirrored."""
+    """The volume at another place. Its axes are turned, and one is mirrored."""
     turn = np.array([[0.8, 0, 0.6], [0, -1, 0], [-0.6, 0, 0.8]])
     voxels = np.asarray(isowave.open(VOLUME)).astype(np.uint8)
     isowave.compress(
