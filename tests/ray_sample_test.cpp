@@ -246,7 +246,7 @@ TEST(RaySample, SilhouettesMayMoveAcrossTheRay) {
   constexpr std::uint32_t kSide = 200;
   const glm::dvec3 center(0, 0, -100);
   const double radius = 35;
-  for (const double limit : {0.5, 2.0}) {
+  for (const double limit : {0.5, 1.0, 2.0, 4.0}) {
     const double pixel = pixel_size_at(camera, kSide, 100), error = limit * pixel;
     const std::vector truth = frames_of_ball(camera, kSide, limit, center, radius);
     const auto share_of = [&](const glm::dvec3 &at, double with_radius) {

@@ -123,7 +123,7 @@ class RemoteVolume {
     const begun = performance.now();
     let answered = begun;
     try {
-      // Chromium asks for parts one after the other that it may keep.
+      // If it may keep parts, Chromium asks for one after the other.
       answer = await fetch(this.url,
         { cache: "no-store", headers: { Range: `bytes=${begin}-${end - 1}` } });
       answered = performance.now();
