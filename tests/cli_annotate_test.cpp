@@ -161,6 +161,9 @@ TEST_F(CliAnnotate, ScenesKeepThem) {
   render(scene + "--annotate caption -o " + in("d.png"));
   render(frame + "--annotate caption -o " + in("c.png"));
   EXPECT_NE(test::read_file(folder_ / "d.png"), test::read_file(folder_ / "c.png"));
+  render(frame + "--annotate caption --title '" + titled.annotations->title + "' -o " +
+         in("e.png"));
+  EXPECT_EQ(test::read_file(folder_ / "e.png"), test::read_file(folder_ / "d.png"));
 }
 
 TEST_F(CliAnnotate, WhatCannotBeIsRefusedInOneLine) {
@@ -172,6 +175,7 @@ TEST_F(CliAnnotate, WhatCannotBeIsRefusedInOneLine) {
   expect_refused(frame + " --annotate axes,none", "--annotate none: there are");
   expect_refused(frame + " --units mm", "--units mm: nothing is annotated: give --annotate");
   expect_refused(frame + " --annotate none --units mm", "--units mm: nothing is annotated");
+  expect_refused(frame + " --title head", "--title head: nothing is annotated: give --annotate");
   expect_refused(frame + " --annotate all --units 12345678901234567",
                  "--units 12345678901234567: give at most 16 letters");
   expect_refused("-i 40 --size 199x150 --annotate all -o " + in("n.png"),

@@ -13,6 +13,7 @@
 
 #include "core/base/error.hpp"
 #include "core/base/utf8.hpp"
+#include "tools/isowave/annotator.hpp"
 #include "tools/isowave/strict_options.hpp"
 
 namespace isowave::core::tools {
@@ -28,6 +29,10 @@ void add_annotation_options(CLI::App &command, AnnotationOptions &options) {
       .add_option("--units", options.units,
                   "units of the world for the scale bar and colours along an axis, such as mm "
                   "[those of --scene]")
+      ->type_name("TEXT");
+  command
+      .add_option("--title", options.title,
+                  "first line of the caption [that of --scene, or the name of the volume's file]")
       ->type_name("TEXT");
 }
 
@@ -72,8 +77,13 @@ std::optional<isowave::Annotations> read_annotations(
     if (!wanted) wanted.emplace();
     choose_annotations(options.wanted, appearance, has_slices, *wanted);
   }
+  for (const auto &[name, text] :
+       {std::pair("--units", options.units), std::pair("--title", options.title)}) {
+    if (!text.empty() && !wanted)
+      throw Error("{} {}: nothing is annotated: give --annotate", name, text);
+  }
+  if (!options.title.empty()) wanted->title = options.title;
   if (options.units.empty()) return wanted;
-  if (!wanted) throw Error("--units {}: nothing is annotated: give --annotate", options.units);
   if (count_letters(printable_utf8(options.units)) > isowave::kMostUnits)
     throw Error("--units {}: give at most {} letters", options.units, isowave::kMostUnits);
   wanted->units = options.units;
@@ -82,18 +92,21 @@ std::optional<isowave::Annotations> read_annotations(
 
 #ifndef ISOWAVE_HAS_CAIRO
 
-void check_cairo() {
-  throw Error(
-      "annotations: this isowave was built without Cairo: leave out --annotate, or give "
-      "--annotate none");
+void check_annotations() {
+  if (!has_annotator())
+    throw Error(
+        "annotations: this isowave was built without Cairo: leave out --annotate, or give "
+        "--annotate none");
+  Image8 nothing{};
+  ask_annotator(nothing, {});
 }
-void draw_annotations(Image8 &, const std::vector<isowave::AnnotationGroup> &) {
-  check_cairo();
+void draw_annotations(Image8 &image, const std::vector<isowave::AnnotationGroup> &groups) {
+  ask_annotator(image, groups);
 }
 
 #else
 
-void check_cairo() {}
+void check_annotations() {}
 
 namespace {
 

@@ -1,5 +1,6 @@
 #pragma once
-// Annotations over a picture, drawn by Cairo if the program was built with it.
+// Annotations over a picture, drawn by Cairo if the program was built with it,
+// otherwise by the Python package that started it.
 
 #include <CLI/CLI.hpp>
 #include <optional>
@@ -14,6 +15,7 @@ namespace isowave::core::tools {
 struct AnnotationOptions {
   std::string wanted;  ///< names with commas, "all", or "none"
   std::string units;   ///< of the world
+  std::string title;   ///< of the caption
 };
 
 void add_annotation_options(CLI::App &command, AnnotationOptions &options);
@@ -27,12 +29,12 @@ std::optional<isowave::Annotations> read_annotations(
     const isowave::Appearance &appearance, bool has_slices);
 
 /// Throws  Error: this program cannot draw annotations
-void check_cairo();
+void check_annotations();
 
 /// Draws over an RGB or RGBA picture; RGBA becomes opaque there. Pixels without annotations keep
 /// their values.
 ///
-/// Throws  Error: Cairo cannot draw it, or there is none
+/// Throws  Error: they cannot be drawn
 void draw_annotations(Image8 &image, const std::vector<isowave::AnnotationGroup> &groups);
 
 }  // namespace isowave::core::tools

@@ -495,7 +495,7 @@ void read_annotations_of(RenderArgs &options, const Drawing &drawing) {
   options.annotations =
       read_annotations(options.annotation_options, options.annotations, look, !slices.empty());
   if (!options.annotations || !writes_annotated(options)) return;
-  check_cairo();
+  check_annotations();
   const ImageSize &size = drawing.views.size;
   annotation_layout(*options.annotations,
                     {.size = {size.width, size.height}, .appearance = look, .slices = slices}, {});

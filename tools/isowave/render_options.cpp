@@ -242,7 +242,8 @@ void check_options(const CLI::App &command, const RenderArgs &options, const Tea
                    "no picture is written: give --output");
   }
   if (!writes_annotated(options))
-    refuse_options(command, {"--annotate", "--units"}, "no picture is annotated: give --output");
+    refuse_options(command, {"--annotate", "--units", "--title"},
+                   "no picture is annotated: give --output");
   if (!options.color_map.by.empty() && !options.color_map.by_field)
     refuse_options(command, {"--color"}, "--color-by colours surfaces: leave out either");
   if (options.color_map.by_field)
@@ -326,12 +327,12 @@ namespace {
 
 /// Options of every day come first, those of researchers last.
 void group_render_options(CLI::App &command) {
-  group_options(
-      command, "Options of every day",
-      {"--help",        "--isovalue",   "--surface",     "--labels",   "--scene",    "--output",
-       "--size",        "--samples",    "--steps",       "--color",    "--color-by", "--color-map",
-       "--field-index", "--background", "--transparent", "--light",    "--shadow",   "--bounce",
-       "--light-angle", "--normals",    "--ambient",     "--annotate", "--units",    "--device"});
+  group_options(command, "Options of every day",
+                {"--help",     "--isovalue",  "--surface",     "--labels",      "--scene",
+                 "--output",   "--size",      "--samples",     "--steps",       "--color",
+                 "--color-by", "--color-map", "--field-index", "--background",  "--transparent",
+                 "--light",    "--shadow",    "--bounce",      "--light-angle", "--normals",
+                 "--ambient",  "--annotate",  "--units",       "--title",       "--device"});
   group_options(command, "Views",
                 {"--view", "--up", "--zoom", "--fit", "--orbit", "--turntable", "--cameras",
                  "--save-camera", "--parallel"});

@@ -92,7 +92,7 @@ def draw(picture: npt.NDArray[np.uint8], groups: list[dict[str, Any]]) -> npt.ND
         import PIL.ImageDraw
         import PIL.ImageFont
     except ImportError:
-        raise _core.Error("annotations need Pillow: pip install 'isowave[annotations]'") from None
+        raise _core.Error("annotations need Pillow: pip install pillow") from None
     result: npt.NDArray[np.uint8] = picture.copy()
     for group in groups:
         (left, top), (right, bottom) = group["begin"], group["end"]

@@ -223,7 +223,9 @@ def with_nrrd(
         for at, text in scene.option(name):
             changed[at] = text
         more = more or ([] if no_data is None else ["--no-data", repr(no_data)])
-    title = next(_names(real.values()), None) if arguments[0] == "export" else None
+    is_annotated = take_option([*arguments], "--annotate") not in (None, "none")
+    shows_title = arguments[0] == "export" or is_annotated
+    title = next(_names(real.values()), None) if shows_title else None
     left = [text for text in changed if text is not None]
     is_done = {"--index": has_volume, "--field-index": has_field}  # else the program reads the file
     for name in OPTIONS:

@@ -70,6 +70,9 @@ class GivenScene:
             real[nrrd] = SourceFile(path, part.dataset or "", text_of_index(part.index))
             fields |= {name: nrrd, f"{prefix}dataset": None, f"{prefix}index": None}
             no_data = no_data if is_field else missing
+        shown = fields["annotations"]
+        if shown and self.volume:
+            shown["title"] = shown["title"] or Path(self.fields["volume"]).name
         written = os.path.join(folder, Path(self.path).name)
         _core.write_scene(fields, written)
         return written, no_data

@@ -118,7 +118,7 @@ class Image:
     ) -> npt.NDArray[np.uint8]:
         """A copy of the picture with a scale bar and more, (height, width, 3), or 4 with alpha.
 
-        The arrays of the image stay as they are. Needs Pillow: pip install 'isowave[annotations]'.
+        The arrays of the image stay as they are.
         An argument that is None is that of the scene's annotations, if a scene with some was drawn.
 
         Parameters

@@ -1,6 +1,7 @@
 """The command `isowave`: `view` is Python's, everything else the program in the wheel.
 
-Files that the program cannot read, and packages of Python can, it gets as NRRD.
+Files that the program cannot read, and packages of Python can, it gets as NRRD. Pillow draws its
+annotations.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import tempfile
 from collections.abc import Sequence
 from typing import Any
 
-from isowave import _loader
+from isowave import _annotator, _loader
 from isowave._core import Error
 from isowave._given_files import Given, given_files, take_option, with_nrrd
 from isowave._given_scene import GivenScene, given_scene, name_real_files, refuse_to_replace
@@ -52,16 +53,17 @@ def main() -> int:
     except Error as error:
         print(f"isowave: {error}", file=sys.stderr)
         return 1
-    if files or scene:
-        return run_with_nrrd(arguments, files, scene)
+    if files or scene or _annotator.may_annotate(arguments):
+        return run_as_child(arguments, files, scene)
     signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # Python ignores it, which a program inherits
     os.execv(PROGRAM, ["isowave", *arguments])
 
 
-def run_with_nrrd(
-    arguments: Sequence[str], files: Sequence[Given], scene: GivenScene | None
-) -> int:
-    """Runs the program with NRRD files in place of these. Returns its exit status."""
+def run_as_child(arguments: Sequence[str], files: Sequence[Given], scene: GivenScene | None) -> int:
+    """Runs the program with NRRD files in place of these, and draws its annotations.
+
+    Returns its exit status.
+    """
 
     def stop(*_: Any) -> None:
         sys.exit(128 + signal.SIGTERM)  # by way of the folder's end
@@ -74,7 +76,7 @@ def run_with_nrrd(
                 refuse_to_replace(scene, arguments)
             changed = with_nrrd(arguments, files, folder, names_of, scene)
             saved = take_option([*changed], "--save-scene")
-            with subprocess.Popen([PROGRAM, *changed]) as process:
+            with _annotator.start([PROGRAM, *changed]) as process:
                 signal.signal(signal.SIGINT, lambda *_: None)  # Ctrl-C ends the program, too
                 signal.signal(signal.SIGTERM, lambda *_: process.terminate())
                 status = process.wait()

@@ -1,8 +1,6 @@
 """Annotated pictures: they change where the layout says, and as far as the compiled part says."""
 
 import builtins
-import subprocess
-import sys
 
 import numpy as np
 import PIL.ImageFont
@@ -167,24 +165,3 @@ def test_what_cannot_be_is_one_line(volume, monkeypatch):
     monkeypatch.setattr(builtins, "__import__", without_pillow)
     with pytest.raises(isowave.Error, match="annotations need Pillow: pip install"):
         image.annotated()
-
-
-def test_the_packages_program_has_no_cairo(tmp_path):
-    """The wheel stays small."""
-    code = "import sys; from isowave._program import main; sys.exit(main())"
-    command = [sys.executable, "-c", code, "render", FUEL, "--device", "host"]
-    picture, scene = tmp_path / "a.png", tmp_path / "scene.json"
-    isowave.open(FUEL).scene().surface(40).annotate("axes").save(scene)
-
-    def run(*options):
-        return subprocess.run([*command, *options], capture_output=True, text=True)
-
-    for options in (["-i", "40", "--annotate", "all"], ["--scene", scene]):
-        done = run(*options, "-o", picture)
-        assert done.returncode == 1 and not picture.exists()
-        assert done.stderr == (
-            "isowave: annotations: this isowave was built without Cairo: leave out --annotate, "
-            "or give --annotate none\n"
-        )
-    assert run("--scene", scene, "-o", picture, "--annotate", "none").returncode == 0
-    assert run("--scene", scene, "--depth", tmp_path / "d.npy").returncode == 0
