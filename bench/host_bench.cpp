@@ -300,7 +300,7 @@ int main(int argc, char **argv) {
   app.add_option("--rounds", options.rounds, "times that each frame is drawn each way")
       ->check(CLI::Range(1u, 100000u))
       ->capture_default_str();
-  app.add_option("--threads", options.threads, "0: one per processor")->capture_default_str();
+  app.add_option("--num-threads", options.threads, "0: one per processor")->capture_default_str();
   app.add_option("--size", options.size, "picture size WxH [1280x720]")
       ->delimiter('x')
       ->expected(2);

@@ -148,7 +148,7 @@ void add_convert(CLI::App &app) {
                       "cpu, gpu, or a part of its name; the file is the same [the host's "
                       "processors]");
   command
-      ->add_option("--threads", options->input.num_threads,
+      ->add_option("--num-threads", options->input.num_threads,
                    "number of threads; 0: one per processor")
       ->capture_default_str();
   command->add_flag("--no-verify", options->no_verify,

@@ -101,7 +101,7 @@ void add_generate(CLI::App &app) {
                       "device that makes fields of noise, if it is no CPU and has doubles: index, "
                       "gpu, or a part of its name; the file is the same [the host's processors]");
   command
-      ->add_option("--threads", options->generate.num_threads,
+      ->add_option("--num-threads", options->generate.num_threads,
                    "number of threads; 0: one per processor")
       ->capture_default_str();
   command

@@ -239,11 +239,11 @@ class BrickRenderer(Placed[_core.Renderer]):
 
         return call
 
-    @takes(Renderer.render, without=("time_budget",), outputs=OUTPUTS)
+    @takes(Renderer.render, without=("time_budget_ms",), outputs=OUTPUTS)
     def render(
         self, isovalue: float | None = None, **frame: Unpack[FrameArguments]
     ) -> Image | None:
-        """Draws a frame; arguments as Renderer.render(), without positions and time_budget.
+        """Draws a frame; arguments as Renderer.render(), without positions and time_budget_ms.
 
         `max_surface_error` by proof and the output "bounds" need bounds=True. One Renderer would
         choose the same detail, and find the same bounds. All processes give an `on_pass`, or none.
@@ -270,8 +270,8 @@ class BrickRenderer(Placed[_core.Renderer]):
             for name in request.outputs:
                 if name not in ALL_OUTPUTS:
                     raise ValueError(f"outputs {name}: bricks have {', '.join(ALL_OUTPUTS)}")
-            if request.time_budget is not None:
-                raise TypeError("a BrickRenderer draws without time_budget")
+            if request.time_budget_ms is not None:
+                raise TypeError("a BrickRenderer draws without time_budget_ms")
             return self._checked(request)
 
         request = self._processes.together(ask)

@@ -172,7 +172,7 @@ class Renderer:
         budget allows, or without a budget as many as frames need.
     levels, bounds, time_budget, rays
         Whether frames may use levels of detail; ask for `max_surface_error` and bounds; have a
-        `time_budget`; have `ambient` rays, and cast_rays() may be called. On the host they may.
+        `time_budget_ms`; have `ambient_rays`, and cast_rays() may be called. On the host they may.
     bounce
         The same as rays, and frames may have `bounce_rays`. On the host they may.
     surfaces
@@ -333,8 +333,8 @@ class Renderer:
         series: Sequence[Camera] = (),
         voxel_pixels: float = 0.0,
         voxel_error: float = 0.0,
-        time_budget: float | None = None,
-        ambient: int = 0,
+        time_budget_ms: float | None = None,
+        ambient_rays: int = 0,
         on_pass: Callable[[Progress], bool | None] | None = None,
         progress: bool | Told | None = None,
     ) -> Image:
@@ -380,9 +380,9 @@ class Renderer:
             open. A `max_surface_error` by proof and the output "bounds" need whole surfaces.
         surfaces
             Up to 8 surfaces in one picture, instead of `isovalue` and `color`: see Surface. Needs
-            surfaces= of the constructor; not with max_image_error, time_budget; labels not with
+            surfaces= of the constructor; not with max_image_error, time_budget_ms; labels not with
             voxel_pixels, max_surface_error. Errors are those of each ray's first hit. Rays of
-            `ambient` and shadows end at those of opacity 1.
+            `ambient_rays` and shadows end at those of opacity 1.
         slices, slice_map
             Planes that show the voxels beside the surfaces, see Slice: up to 8 with them, with
             their conditions. A ColorMap gives colours and range [the volume's]; the rest of it is
@@ -409,15 +409,15 @@ class Renderer:
         voxel_pixels, voxel_error
             Largest distance between voxels of coarser levels [pixels], which needs levels=True, and
             largest difference of decoded voxels from the compressed ones [voxel values]; 0: none.
-        time_budget
-            Draws the best picture possible in so many seconds. Needs time_budget=True.
-        ambient
+        time_budget_ms
+            Draws the best picture possible in so many milliseconds. Needs time_budget=True.
+        ambient_rays
             Rays from each hit, up to 255, that find out how much of the sky it sees. 16 and more
             look smooth. Each takes about as long as a frame without any. Needs rays=True.
         on_pass
             Called after each pass with the picture so far. If it returns False, the frame stops.
         progress
-            As compress() has it, for frames of more than two seconds without time_budget.
+            As compress() has it, for frames of more than two seconds without time_budget_ms.
 
         Raises
         ------
@@ -511,7 +511,7 @@ class Renderer:
                 return
 
         def on_pass(progress: Progress) -> bool:
-            if progress.completed_percent == 100 and not request.ambient:
+            if progress.completed_percent == 100 and not request.ambient_rays:
                 return True  # the finished picture follows
             statistics: dict[str, Any] = {"passes": progress.passes, "complete": False}
             statistics["completed_percent"] = progress.completed_percent

@@ -117,8 +117,8 @@ class FrameArguments(Look, total=False):
     series: Sequence[Camera]
     voxel_pixels: float
     voxel_error: float
-    time_budget: float | None
-    ambient: int
+    time_budget_ms: float | None
+    ambient_rays: int
     on_pass: OnPass | None
     progress: bool | Told | None
 
@@ -163,8 +163,8 @@ class Request:
     series: Sequence[Camera] = ()
     voxel_pixels: float = 0.0
     voxel_error: float = 0.0
-    time_budget: float | None = None
-    ambient: int = 0
+    time_budget_ms: float | None = None
+    ambient_rays: int = 0
     on_pass: OnPass | None = None
     progress: bool | Told | None = None
 
@@ -201,8 +201,8 @@ class Request:
             "series": series_of(self.series),
             "voxel_pixels": number("voxel_pixels", self.voxel_pixels),
             "voxel_error": number("voxel_error", self.voxel_error),
-            "time_budget": optional("time_budget", self.time_budget),
-            "ambient": whole("ambient", self.ambient),
+            "time_budget_ms": optional("time_budget_ms", self.time_budget_ms),
+            "ambient_rays": whole("ambient_rays", self.ambient_rays),
             "on_pass": function("on_pass", self.on_pass),
             "progress": progress_of(self.progress),
         }
@@ -266,11 +266,11 @@ class Request:
                 "max_surface_error" if by_sample else "voxel_pixels",
                 of_levels or self.voxel_pixels > 0,
             ),
-            "time_budget": ("time_budget", self.time_budget is not None),
+            "time_budget": ("time_budget_ms", self.time_budget_ms is not None),
             "labels": ("labels", self.has_labels),
             "rays": (
-                "ambient" if self.ambient else "shadow_rays",
-                self.ambient != 0 or self.shadow_rays != 0,
+                "ambient_rays" if self.ambient_rays else "shadow_rays",
+                self.ambient_rays != 0 or self.shadow_rays != 0,
             ),
             "bounce": ("bounce_rays", self.bounce_rays != 0),
         }
@@ -307,8 +307,8 @@ class Request:
             "by": self.by,
             "max_image_error": self.max_image_error,
             "series": [camera_for_core(camera) for camera in self.series],
-            "time_budget_ms": None if self.time_budget is None else 1000 * self.time_budget,
-            "ambient_rays": self.ambient,
+            "time_budget_ms": self.time_budget_ms,
+            "ambient_rays": self.ambient_rays,
             "want_picture": "rgb" in self.outputs,
             "want_depth": "depth" in self.outputs,
             "want_normals": "normals" in self.outputs,

@@ -26,7 +26,7 @@ def keep(name, image):
 renderer = isowave.BrickRenderer(fuel, comm, size=(96, 64), samples=2, rays=True, exact=True)
 keep("plain", renderer.render(40))
 keep("samples", renderer.render(40, samples=2, size=(48, 32), normals="cell"))
-keep("ambient", renderer.render(40, ambient=3, color="#3070b0"))
+keep("ambient", renderer.render(40, ambient_rays=3, color="#3070b0"))
 for samples in (1, 2):
     image = renderer.render(40, size=(48, 32), samples=samples, transparent=True)
     if image is not None:
@@ -54,7 +54,7 @@ layered = isowave.BrickRenderer(
 both = [isowave.Surface(20, "skin", 0.4), isowave.Surface(90, "blue")]
 keep("surfaces", layered.render(surfaces=both))
 slices = [isowave.Slice("z", 14), isowave.Slice("x", 30, 0.5)]
-keep("slices", layered.render(surfaces=both, slices=slices, slice_map="magma", ambient=2))
+keep("slices", layered.render(surfaces=both, slices=slices, slice_map="magma", ambient_rays=2))
 by_field = isowave.ColorMap(by="field")
 image = layered.render(
     90, clip=[isowave.ClipPlane((0, 0, 1), 12)], color_map=by_field, outputs=("rgb", "field")
@@ -82,7 +82,7 @@ def passes_of(renderer, last=None, **scene):
 
 for name, by, scene in (
     ("one", renderer, {"isovalue": 40}),
-    ("layers", layered, {"surfaces": both, "slices": slices, "ambient": 1}),
+    ("layers", layered, {"surfaces": both, "slices": slices, "ambient_rays": 1}),
 ):
     seen, image = passes_of(by, **scene)
     keep(f"passes of {name}", image)
@@ -125,7 +125,7 @@ fails("outputs", lambda: renderer.render(40, outputs=("position",)))
 fails("in on_pass", lambda: renderer.render(40, on_pass=lambda progress: progress.rgba))
 fails("answer", lambda: renderer.render(40, on_pass=lambda progress: "yes"))
 fails("one on_pass", lambda: renderer.render(40, on_pass=print if rank == 1 else None))
-fails("time", lambda: renderer.render(40, time_budget=1.0))
+fails("time", lambda: renderer.render(40, time_budget_ms=1000))
 fails("max_surface_error", lambda: renderer.render(40, max_surface_error=1.0))
 fails("no error", lambda: bounded.render(40, max_surface_error=0.0))
 fails("too large", lambda: renderer.render(40, size=(960, 640)))

@@ -33,7 +33,7 @@ def named(function):
         (isowave.Series.render, OF_VOLUME, set()),
         (isowave.Scene.render, OF_VOLUME, {"isovalue"}),
         (isowave.Renderer.passes, set(), {"on_pass", "progress"}),
-        (isowave.BrickRenderer.render, set(), {"time_budget"}),
+        (isowave.BrickRenderer.render, set(), {"time_budget_ms"}),
     ],
 )
 def test_all_that_draw_name_the_arguments_of_a_frame(function, own, without):

@@ -64,7 +64,7 @@ def test_the_bits_of_one_process(drawn):
     expect(pictures, "again", plain)
     samples = renderer.render(40, samples=2, size=(48, 32), normals="cell", outputs=outputs)
     expect(pictures, "samples", samples)
-    ambient = renderer.render(40, ambient=3, color="#3070b0", outputs=outputs)
+    ambient = renderer.render(40, ambient_rays=3, color="#3070b0", outputs=outputs)
     expect(pictures, "ambient", ambient)
     for samples in (1, 2):
         image = renderer.render(40, size=(48, 32), samples=samples, transparent=True)
@@ -88,7 +88,7 @@ def test_surfaces(drawn):
         pictures,
         "slices",
         renderer.render(
-            surfaces=both, slices=slices, slice_map="magma", ambient=2, outputs=outputs
+            surfaces=both, slices=slices, slice_map="magma", ambient_rays=2, outputs=outputs
         ),
     )
     image = renderer.render(
@@ -113,7 +113,7 @@ def test_pictures_of_passes(drawn):
             {
                 "surfaces": [isowave.Surface(20, "skin", 0.4), isowave.Surface(90, "blue")],
                 "slices": [isowave.Slice("z", 14), isowave.Slice("x", 30, 0.5)],
-                "ambient": 1,
+                "ambient_rays": 1,
             },
         ),
     ):
@@ -182,7 +182,7 @@ def test_bounds_of_the_error(drawn, levelled):
         ("in on_pass", "the picture has no alpha"),
         ("answer", "what on_pass returns"),
         ("one on_pass", "rank 1 has another request than rank 0"),
-        ("time", "a BrickRenderer draws without time_budget"),
+        ("time", "a BrickRenderer draws without time_budget_ms"),
         ("max_surface_error", "made with_bounds"),
         ("no error", "an error of 0 pixels cannot be kept"),
         ("too large", "960"),

@@ -113,7 +113,13 @@ def test_all_requests_are_clipped_with_the_same_bits(ball: isowave.Volume) -> No
     on_host = ball.renderer(size=SIZE, device="host")
     able = {"levels": True, "time_budget": True, "rays": True}
     on_device = ball.renderer(size=SIZE, device="cpu", **able)
-    for more in ({}, {"caps": False}, {"ambient": 3}, {"time_budget": 1e6}, {"voxel_pixels": 9}):
+    for more in (
+        {},
+        {"caps": False},
+        {"ambient_rays": 3},
+        {"time_budget_ms": 1e6},
+        {"voxel_pixels": 9},
+    ):
         options = {"camera": CAMERA, "clip": CLIPS["box"], **more}
         a, b = (renderer.render(0, **options) for renderer in (on_host, on_device))
         assert np.array_equal(a.rgb, b.rgb) and np.array_equal(a.depth, b.depth), more

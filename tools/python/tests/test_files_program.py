@@ -1,10 +1,8 @@
 """Files that packages of Python read, in series, in `isowave view` and for the program."""
 
-import inspect
 import json
 import os
 import pathlib
-import re
 import signal
 import subprocess
 import sys
@@ -462,19 +460,3 @@ def test_help_names_the_options(capsys, monkeypatch):
     shown = capsys.readouterr().out
     for text in ("isowave[files]", "--dataset NAME", "--index AXIS=N", "\n\nExit status:"):
         assert text in shown
-
-
-def test_names_of_options_agree(capsys):
-    """What `isowave view` shares with the program has the program's names (B4)."""
-    text = command("render", "--help").stdout
-    of_render = set(re.findall(r"--[a-z][-a-z]*", text)) | {"--dataset", "--field-dataset"}
-    options = {o for each in make_parser()._actions for o in each.option_strings}
-    of_page = {"--host", "--port", "--max-clients", "--max-rays", "--no-browser"}
-    assert {each for each in options if each.startswith("--")} - of_page <= of_render
-    python = {"--dims": "shape", "--type": "dtype", "--tolerance-relative": "tolerance_relative"}
-    names = {name.replace("-", "_").strip("_") for name in of_render} | {*python.values()}
-    assert {*inspect.signature(isowave.open).parameters} - {"path"} <= names | {
-        "map_nan",  # of convert
-        "progress",
-        "num_threads",  # --threads of convert
-    }

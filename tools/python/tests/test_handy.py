@@ -201,7 +201,7 @@ def test_progress_within_a_frame(volume, device):
     renderer = volume.renderer(size=(256, 192), device=device, rays=True)
     image = renderer.render(
         6,
-        ambient=4,
+        ambient_rays=4,
         on_pass=lambda so_far: time.sleep(0.12),
         progress=lambda what, done: told.append((what, done)),
     )
@@ -209,7 +209,7 @@ def test_progress_within_a_frame(volume, device):
     parts = [done for _, done in told]
     assert 2 <= len(parts) <= 1000 and parts == sorted(parts)
     assert 0 < parts[0] < parts[-1] <= 1
-    assert np.array_equal(image.rgb, renderer.render(6, ambient=4).rgb)
+    assert np.array_equal(image.rgb, renderer.render(6, ambient_rays=4).rgb)
 
 
 def test_an_exception_of_progress_is_raised(volume):
@@ -218,7 +218,7 @@ def test_an_exception_of_progress_is_raised(volume):
 
     renderer = volume.renderer(size=SIZE, device="cpu", rays=True)
     with pytest.raises(KeyError, match="my own"):
-        renderer.render(6, ambient=2, on_pass=lambda p: time.sleep(0.12), progress=broken)
+        renderer.render(6, ambient_rays=2, on_pass=lambda p: time.sleep(0.12), progress=broken)
     assert renderer.render(6).complete
     with pytest.raises(TypeError, match="progress=5: give True or False"):
         renderer.render(6, progress=5)

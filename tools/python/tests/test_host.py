@@ -41,7 +41,7 @@ def test_the_host_draws_by_default(no_name, leveled):
     assert not on_host(on_device)
     camera = on_device.camera(12)
     assert renderer.camera(12) == camera
-    for more in ({}, {"voxel_pixels": 3}, {"ambient": 3}, {"outputs": ("bounds", "depth")}):
+    for more in ({}, {"voxel_pixels": 3}, {"ambient_rays": 3}, {"outputs": ("bounds", "depth")}):
         got, expected = renderer.render(12, **more), on_device.render(12, **more)
         for name in ("rgb", "depth", "bounds"):
             np.testing.assert_array_equal(getattr(got, name), getattr(expected, name))
@@ -51,7 +51,7 @@ def test_the_users_size_counts_on_the_host(no_name, leveled):
     assert leveled.render(12, size=(50, 40)).rgb.shape == (40, 50, 3)
     first = leveled._renderer
     assert on_host(first)
-    assert leveled.render(12, size=(1500, 1000), ambient=1).rgb.shape == (1000, 1500, 3)
+    assert leveled.render(12, size=(1500, 1000), ambient_rays=1).rgb.shape == (1000, 1500, 3)
     assert leveled._renderer is first, "it is not made anew for more rays, nor for ambient ones"
     camera = leveled.camera(12, size=(100, 300))
     assert camera == leveled.camera(12, size=(100, 300), device="cpu")

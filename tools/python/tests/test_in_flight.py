@@ -27,7 +27,7 @@ EXITS = {
     "draws": "beside(lambda: volume.render(100, size=(320, 240)))",
     "on_pass": """
 r = volume.renderer(size=(800, 600), rays=True)
-beside(lambda: r.render(100, ambient=8, on_pass=lambda p: p.rgb is not None))
+beside(lambda: r.render(100, ambient_rays=8, on_pass=lambda p: p.rgb is not None))
 """,
     "on_pass_sleeps": """
 r = volume.renderer(size=(320, 240))
@@ -35,7 +35,7 @@ beside(lambda: r.render(100, on_pass=lambda p: time.sleep(1.3)))
 """,
     "passes": """
 r = volume.renderer(size=(800, 600), rays=True)
-g = r.passes(100, ambient=8)
+g = r.passes(100, ambient_rays=8)
 next(g)
 """,
     "quick": "beside(lambda: volume.renderer(size=(640, 480), quick=True, bounds=True))",
@@ -188,10 +188,10 @@ def test_the_call_alone_decides_whether_a_budget_is_enough():
     assert volume.render(100, size=SIZE, memory_budget=budget).complete
     for _ in range(2):
         with pytest.raises(isowave.Error, match="budget"):
-            volume.render(100, size=SIZE, memory_budget=budget, ambient=1)
+            volume.render(100, size=SIZE, memory_budget=budget, ambient_rays=1)
         with pytest.raises(isowave.Error, match="budget"):
             volume.render(100, size=SIZE, memory_budget=1000)
-    assert volume.render(100, size=SIZE, ambient=1).complete
+    assert volume.render(100, size=SIZE, ambient_rays=1).complete
     assert volume.render(100, size=SIZE, memory_budget=budget).complete
     assert volume.cast_rays(np.ones((1, 6)), 100, device="cpu")["t_hit"].shape == (1,)
 
@@ -223,7 +223,7 @@ def test_arguments_of_a_wrong_type_are_named(volume):
         "map_nan": [lambda v: isowave.compress(voxels, map_nan=v), "0"],
         "progress": [lambda v: isowave.compress(voxels, progress=v), 5],
         "samples": [lambda v: render(6, samples=v), -1, 1.5],
-        "ambient": [lambda v: render(6, ambient=v), 2.5, -1],
+        "ambient_rays": [lambda v: render(6, ambient_rays=v), 2.5, -1],
         "isovalue": [lambda v: render(v), "6", None, b"6"],
         "size": [lambda v: render(6, size=v), 5, (64.5, 48), (1, 2, 3), (-1, 5)],
         "camera": [lambda v: render(6, camera=v), "front", 5],
@@ -253,7 +253,7 @@ def test_numbers_of_numpy_are_numbers(volume):
         np.float32(6),
         size=np.array(SIZE),
         color=np.ones(3),
-        ambient=np.uint8(1),
+        ambient_rays=np.uint8(1),
         camera=isowave.Camera(np.zeros(3), np.ones(3), fovy=np.float32(60)),
         on_pass=lambda progress: np.bool_(False),
     )

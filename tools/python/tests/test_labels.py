@@ -54,7 +54,7 @@ def test_a_label_s_surface_is_that_of_its_indicator(
 
 def test_a_volume_draws_labels_and_isosurfaces_in_turn(volume: isowave.Volume) -> None:
     first = volume.render(surfaces=[Surface(labels=3)], size=SIZE)
-    volume.render(1, size=SIZE, ambient=2)
+    volume.render(1, size=SIZE, ambient_rays=2)
     again = volume.render(surfaces=[Surface(labels=(3,)), Surface(labels=[7])], size=SIZE)
     assert first.depth is not None and np.isfinite(first.depth).any() and again.rgb is not None
 
@@ -136,7 +136,7 @@ def test_what_is_no_label_is_refused(
     [
         ({"max_surface_error": 2}, "without max_surface_error"),
         ({"voxel_pixels": 1}, "without voxel_pixels"),
-        ({"time_budget": 1.0}, "without time_budget"),
+        ({"time_budget_ms": 1000}, "without time_budget_ms"),
         ({"slices": [Slice("x", 5)]}, "without slices"),
     ],
 )

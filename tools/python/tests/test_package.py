@@ -204,20 +204,20 @@ def test_ambient_rays_darken_what_sees_little_of_the_sky():
     camera = isowave.Camera((12.5, 13.5, 14.5), (13.5, 13.5, 14.5))
     plain = hollow.render(9, size=SIZE, camera=camera)
     renderer = hollow.renderer(size=SIZE, rays=True)
-    dark = renderer.render(9, camera=camera, ambient=8)
+    dark = renderer.render(9, camera=camera, ambient_rays=8)
     assert np.array_equal(dark.depth, plain.depth)
     assert (dark.rgb < plain.rgb).all(), "none of the sky is seen from within"
     assert dark.statistics["ambient_passes"] >= 8
-    assert np.array_equal(hollow.render(9, size=SIZE, camera=camera, ambient=8).rgb, dark.rgb)
+    assert np.array_equal(hollow.render(9, size=SIZE, camera=camera, ambient_rays=8).rgb, dark.rgb)
     outside = hollow.camera(9, size=SIZE)
-    plain, lit = (renderer.render(9, camera=outside, ambient=n) for n in (0, 8))
+    plain, lit = (renderer.render(9, camera=outside, ambient_rays=n) for n in (0, 8))
     assert np.array_equal(lit.rgb, plain.rgb), "a ball from outside sees all of the sky"
-    last = [image.rgb for image in renderer.passes(9, camera=camera, ambient=3)][-1]
-    assert np.array_equal(last, renderer.render(9, camera=camera, ambient=3).rgb)
+    last = [image.rgb for image in renderer.passes(9, camera=camera, ambient_rays=3)][-1]
+    assert np.array_equal(last, renderer.render(9, camera=camera, ambient_rays=3).rgb)
     with pytest.raises(isowave.Error, match="rays=True"):
-        hollow.renderer(size=SIZE).render(9, ambient=1)
+        hollow.renderer(size=SIZE).render(9, ambient_rays=1)
     with pytest.raises(isowave.Error, match="256 ambient rays of a hit are too many"):
-        renderer.render(9, ambient=256)
+        renderer.render(9, ambient_rays=256)
 
 
 def test_device_and_host_draw_the_same_bits(volume):
@@ -229,8 +229,8 @@ def test_the_host_draws_all_that_a_device_draws():
     options = (
         {"voxel_pixels": 2.0},
         {"max_surface_error": 1.0},
-        {"time_budget": 1e6},
-        {"ambient": 2},
+        {"time_budget_ms": 1e6},
+        {"ambient_rays": 2},
     )
     options += ({"max_surface_error": 1.0, "by": "sample"},)
     finer = isowave.compress(sphere_voxels(), tolerance=0.01, levels=3)
@@ -376,7 +376,7 @@ def test_errors_are_kept_and_bounds_given():
     hit = np.isfinite(image.depth)
     assert np.isfinite(image.bounds[hit]).mean() > 0.5
     assert image.normals is None
-    timed = volume.render(10, size=SIZE, time_budget=1000.0)
+    timed = volume.render(10, size=SIZE, time_budget_ms=1e6)
     assert timed.complete
     shapes = []
 
@@ -385,7 +385,7 @@ def test_errors_are_kept_and_bounds_given():
         return False
 
     # The first picture of an isovalue is small.
-    stopped = volume.render(11, size=SIZE, time_budget=1000.0, on_pass=stop)
+    stopped = volume.render(11, size=SIZE, time_budget_ms=1e6, on_pass=stop)
     assert shapes == [(6, 8, 3)] and not stopped.complete
     assert stopped.rgb.shape == (48, 64, 3)
 
@@ -427,7 +427,7 @@ def test_an_error_of_the_picture_is_kept():
     assert np.array_equal(volume.render(10, size=SIZE, **chosen).rgb, image.rgb)
     beyond = volume.render(10, size=SIZE, max_image_error=1e-6).statistics["detail"]
     assert not beyond["reachable"] and "up to 8 x 8" in beyond["advice"]
-    for argument in ({"max_surface_error": 1.0}, {"time_budget": 1.0}, {"voxel_pixels": 1.0}):
+    for argument in ({"max_surface_error": 1.0}, {"time_budget_ms": 1000}, {"voxel_pixels": 1.0}):
         with pytest.raises(isowave.Error):
             volume.render(10, size=SIZE, max_image_error=0.05, **argument)
 
@@ -437,7 +437,7 @@ def test_bad_requests_are_one_line(volume, renderer):
         lambda: renderer.render(float("nan")),
         lambda: renderer.render(6, size=(640, 480)),
         lambda: renderer.render(6, max_surface_error=1.0),
-        lambda: renderer.render(6, time_budget=1.0),
+        lambda: renderer.render(6, time_budget_ms=1000),
         lambda: renderer.render(6, voxel_pixels=1.0),
         lambda: renderer.render(6, outputs=("rgb", "alpha")),
         lambda: renderer.render(6, color="reddish"),

@@ -120,8 +120,8 @@ def test_arguments_reach_the_request_by_their_names(monkeypatch: pytest.MonkeyPa
         "series": (CAMERA, CAMERA),
         "voxel_pixels": 2.0,
         "voxel_error": 3.0,
-        "time_budget": 4.0,
-        "ambient": 5,
+        "time_budget_ms": 4000.0,
+        "ambient_rays": 5,
         "on_pass": print,
         "progress": False,
     }
@@ -141,7 +141,7 @@ def test_values_are_python_s_own() -> None:
         np.array((64, 48)),
         color="#ff8000",
         clip=[isowave.ClipPlane(np.array((1, 0, 0)), np.int8(2))],  # type: ignore[arg-type]
-        ambient=np.uint8(3),
+        ambient_rays=np.uint8(3),
     )
     assert request == Request(
         80.0,
@@ -149,9 +149,9 @@ def test_values_are_python_s_own() -> None:
         (64, 48),
         color=(1, 128 / 255, 0),
         clip=(isowave.ClipPlane((1, 0, 0), 2),),
-        ambient=3,
+        ambient_rays=3,
     )
-    assert type(request.isovalue) is float and type(request.ambient) is int
+    assert type(request.isovalue) is float and type(request.ambient_rays) is int
     assert request.camera is not None and type(request.camera.eye) is tuple
     assert type(request.clip[0].normal) is tuple and type(request.clip[0].offset) is float
 
@@ -185,8 +185,8 @@ def test_values_are_python_s_own() -> None:
         ("by", "luck", "by 'luck': give 'proof' or 'sample'"),
         ("voxel_pixels", None, "voxel_pixels=None: give a number"),
         ("voxel_error", True, "voxel_error=True: give a number"),
-        ("time_budget", "1 s", "time_budget='1 s': give a number"),
-        ("ambient", -1, "ambient=-1: give a whole number from 0 to 4294967295"),
+        ("time_budget_ms", "1 s", "time_budget_ms='1 s': give a number"),
+        ("ambient_rays", -1, "ambient_rays=-1: give a whole number from 0 to 4294967295"),
         ("on_pass", 1, "on_pass=1: give a function"),
     ],
 )
@@ -230,8 +230,8 @@ def test_surfaces_have_colors_and_give_the_isovalue() -> None:
         ({"max_surface_error": 1.0, "by": "sample"}, {"levels": "max_surface_error"}),
         ({"outputs": ("bounds",)}, {"bounds": "max_surface_error"}),
         ({"voxel_pixels": 1.0}, {"levels": "voxel_pixels"}),
-        ({"time_budget": 1.0}, {"time_budget": "time_budget"}),
-        ({"ambient": 1}, {"rays": "ambient"}),
+        ({"time_budget_ms": 1.0}, {"time_budget": "time_budget_ms"}),
+        ({"ambient_rays": 1}, {"rays": "ambient_rays"}),
     ],
 )
 def test_it_says_what_its_renderer_must_be_made_with(

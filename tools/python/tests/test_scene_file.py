@@ -179,7 +179,7 @@ def test_fields_are_opened_with_their_scene(ball: isowave.Volume, tmp_path: path
 
 def test_one_opaque_surface_is_drawn_with_all_arguments(ball: isowave.Volume) -> None:
     scene = one(ball).clip(HALF, caps=False)  # the inside of a bowl sees less of the sky
-    image = scene.render(size=SIZE, device="host", ambient=4)
+    image = scene.render(size=SIZE, device="host", ambient_rays=4)
     assert not np.array_equal(image.rgb, picture(scene))
 
 

@@ -123,7 +123,7 @@ def test_a_volume_makes_the_renderer_that_is_needed(ball: isowave.Volume) -> Non
     volume.render(0, **more)
     volume.render(surfaces=BOTH[:1], **more)
     assert volume._renderer is second
-    volume.render(0, ambient=1, **more)
+    volume.render(0, ambient_rays=1, **more)
     assert volume._renderer is not None and volume._renderer._can["surfaces"] == 2
 
 
@@ -201,9 +201,9 @@ def test_surfaces_that_cannot_be_drawn_are_refused(ball: isowave.Volume) -> None
     refuse("give an isovalue, or surfaces", [])
     refuse("color: surfaces have colours of their own", color="red")
     glass = [Surface(0, opacity=0.5), Surface(1, opacity=0.9)]
-    refuse("end at surfaces of opacity 1, and there is none", glass, ambient=1)
+    refuse("end at surfaces of opacity 1, and there is none", glass, ambient_rays=1)
     refuse("leave out max_image_error", max_image_error=0.1)
-    refuse("leave out time_budget_ms", time_budget=1)
+    refuse("leave out time_budget_ms", time_budget_ms=1)
     refuse("errors are bounded of whole surfaces", outputs=("bounds",), clip=[HALF])
     on_device = ball.renderer(size=SIZE, device="cpu", surfaces=1)
     with pytest.raises(isowave.Error, match="needs a renderer that was made with surfaces=2"):

@@ -88,7 +88,7 @@ def test_pictures_so_far_are_transparent_too(volume):
             progress.rgb
 
     # The first picture of an isovalue is small.
-    timed = renderer.render(6.5, transparent=True, time_budget=1000.0, on_pass=look)
+    timed = renderer.render(6.5, transparent=True, time_budget_ms=1e6, on_pass=look)
     assert shapes[0] == (6, 8, 4) and shapes[-1] == (48, 64, 4)
     assert np.array_equal(timed.rgba, renderer.render(6.5, transparent=True).rgba)
 

@@ -96,7 +96,7 @@ def test_looks_are_qualities_of_pictures(open_page: Callable[..., Any]) -> None:
         for name, rays in (("Good", (2, 0)), ("Paper", (2, 16)), ("Draft", (1, 0))):
             page.get_by_label(name, exact=True).check()
             request = asked(page, volume)
-            assert (request.samples, request.ambient) == rays
+            assert (request.samples, request.ambient_rays) == rays
             # The sharp picture came first, and was on the page until then.
             shown = [p["stage"] for p in page.evaluate("window.shownPictures")]
             last = len(shown) - shown[::-1].index("first") if "first" in shown else 0
@@ -114,7 +114,7 @@ def test_a_long_picture_says_how_far_it_is(open_page: Callable[..., Any]) -> Non
     def before_pass(drawn: Any) -> None:
         import time
 
-        if drawn.request.ambient:
+        if drawn.request.ambient_rays:
             time.sleep(0.3)
 
     with Server(fake_scene(FakeVolume(before_pass=before_pass, passes=8))) as server:

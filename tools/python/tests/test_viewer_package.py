@@ -136,7 +136,7 @@ def test_without_a_gpu_the_hosts_renderer_draws_all(
         8.5,
         size=(300, 200),
         max_surface_error=1.0,
-        ambient=2,
+        ambient_rays=2,
         color=(0.5, 0.25, 1),
         background=(1, 1, 0),
         device="cpu",

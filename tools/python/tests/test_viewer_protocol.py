@@ -69,13 +69,13 @@ def test_messages_are_read() -> None:
     more: dict[str, Any] = {
         "max_surface_error": 0.5,
         "by": "sample",
-        "ambient": 16,
+        "ambient_rays": 16,
         "progress": False,
     }
     asked = Request(80, camera, (64, 48), 2, **colors, **clip, **more)
     assert check(parse(json.dumps(WISH))) == Wish(7, asked)
     timed = check({**WISH, "max_error": None, "time_budget": 50})
-    assert isinstance(timed, Wish) and timed.request.time_budget == 0.05  # ms to seconds
+    assert isinstance(timed, Wish) and timed.request.time_budget_ms == 50
     assert timed.request.by == "proof"  # there is no error to judge
     coarse = check({**WISH, "max_error": None, "time_budget": 50, "voxel_pixels": 2})
     assert isinstance(coarse, Wish) and coarse.request.voxel_pixels == 2

@@ -111,7 +111,7 @@ def test_a_device_without_memory_for_tiles_says_so_once() -> None:
 def test_the_plan_of_a_large_picture_keeps_its_pixels() -> None:
     scene = make_scene(FakeVolume(), Clock())
     eye = Eye(scene)
-    eye.wish(size=(2560, 1440), samples=4, ambient=16, max_image_error=0.01)
+    eye.wish(size=(2560, 1440), samples=4, ambient_rays=16, max_image_error=0.01)
     assert eye.client.wish is not None
     plan = scene._renderers.plan(eye.client.wish)
     assert (plan.size, plan.samples, plan.ambient) == ((2560, 1440), 1, 16)
@@ -182,7 +182,7 @@ def test_the_page_asks_for_levels_of_detail(open_page: Callable[..., Any]) -> No
         type_into(page.get_by_label("Time per picture"), "200")
         page.keyboard.press("Enter")
         request = asked(page, volume)
-        assert (request.voxel_pixels, request.time_budget) == (1.5, 0.2)
+        assert (request.voxel_pixels, request.time_budget_ms) == (1.5, 200)
         page.reload()
         assert asked(page, volume).voxel_pixels == 1.5
         type_into(page.get_by_label("Accurate to"), "2")
@@ -281,7 +281,7 @@ def test_the_page_asks_for_an_error_of_the_picture(
         type_into(page.get_by_label("Time per picture"), "200")
         page.keyboard.press("Enter")
         request = asked(page, volume)
-        assert (request.max_image_error, request.time_budget) == (None, 0.2)
+        assert (request.max_image_error, request.time_budget_ms) == (None, 200)
         assert "error" not in state(page) and page.problems == []
 
 

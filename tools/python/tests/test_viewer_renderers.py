@@ -118,7 +118,7 @@ def test_on_a_machine_without_a_gpu_the_host_draws_all_of_a_wish() -> None:
     assert [h["state"] for h in eye.of_type("status")] == ["ready"]
     status = eye.of_type("status")[-1]
     assert (status["device"], status["device_memory"], status["notice"]) == ("host", None, "")
-    eye.wish(80.0, size=(1600, 1200), ambient=2, max_surface_error=0.5, time_budget=5.0)
+    eye.wish(80.0, size=(1600, 1200), ambient_rays=2, max_surface_error=0.5, time_budget_ms=5000)
     run(scene)
     clock.now += REST_SECONDS
     run(scene)
@@ -126,8 +126,8 @@ def test_on_a_machine_without_a_gpu_the_host_draws_all_of_a_wish() -> None:
     eye.ack()
     run(scene)
     whole = volume.frames[0]
-    assert (whole.size, whole.request.ambient) == ((1600, 1200), 2)
-    assert (whole.request.max_surface_error, whole.request.time_budget) == (0.5, 5.0)
+    assert (whole.size, whole.request.ambient_rays) == ((1600, 1200), 2)
+    assert (whole.request.max_surface_error, whole.request.time_budget_ms) == (0.5, 5000)
     assert eye.pictures == [(1, "whole"), (1, "lossless")]
     assert eye.of_type("picture")[0]["reduced"] is None
     assert eye.of_type("bounds")[-1]["within_pixel"] > 0
@@ -209,15 +209,15 @@ def test_whole_pictures_have_ambient_rays_and_a_renderer_for_them() -> None:
     clock, volume = Clock(), FakeVolume()
     scene = make_scene(volume, clock, size=(64, 48))
     eye = Eye(scene)
-    eye.wish(size=(64, 48), ambient=16)
+    eye.wish(size=(64, 48), ambient_rays=16)
     run(scene)
     assert [r["rays"] for r in volume.renderers] == [False, True]
-    drawn = [(frame.size, frame.request.ambient) for frame in volume.frames]
+    drawn = [(frame.size, frame.request.ambient_rays) for frame in volume.frames]
     assert drawn == [((16, 12), 0), ((64, 48), 0), ((64, 48), 16)], "none before it is sharp"
     eye.ack()
     eye.wish(81.0, size=(64, 48))
     run(scene)
-    assert volume.frames[-1].request.ambient == 0 and len(volume.renderers) == 2
+    assert volume.frames[-1].request.ambient_rays == 0 and len(volume.renderers) == 2
 
 
 def test_shadows_are_drawn_as_ambient_rays_are() -> None:
@@ -244,15 +244,15 @@ def test_shadows_are_drawn_as_ambient_rays_are() -> None:
     assert "bounds" in volume.frames[-1].request.outputs
     assert volume.frames[-1].request.shadow_rays == 0
     # Ambient rays give way to shadow rays; both count.
-    eye.wish(81.0, size=(64, 48), shadow_rays=7, ambient=4, **lit)
+    eye.wish(81.0, size=(64, 48), shadow_rays=7, ambient_rays=4, **lit)
     run(scene)
     request = volume.frames[-1].request
-    assert (volume.frames[-1].size, request.shadow_rays, request.ambient) == ((64, 48), 7, 2)
+    assert (volume.frames[-1].size, request.shadow_rays, request.ambient_rays) == ((64, 48), 7, 2)
     eye.ack()
-    eye.wish(82.0, size=(64, 48), shadow_rays=16, ambient=4, **lit)
+    eye.wish(82.0, size=(64, 48), shadow_rays=16, ambient_rays=4, **lit)
     run(scene)
     request = volume.frames[-1].request
-    assert (volume.frames[-1].size, request.shadow_rays, request.ambient) == ((64, 48), 9, 0)
+    assert (volume.frames[-1].size, request.shadow_rays, request.ambient_rays) == ((64, 48), 9, 0)
     assert eye.of_type("picture")[-1]["reduced"].endswith("0 ambient rays, 9 shadow rays.")
     eye.ack()
     eye.wish(83.0, size=(64, 48))
@@ -267,7 +267,7 @@ def test_light_that_bounces_needs_a_renderer_of_its_own() -> None:
     clock, volume = Clock(), FakeVolume()
     scene = make_scene(volume, clock, size=(64, 48), max_rays=64 * 48 * 21)
     eye = Eye(scene)
-    eye.wish(size=(64, 48), ambient=4)
+    eye.wish(size=(64, 48), ambient_rays=4)
     run(scene)
     eye.ack()
     eye.wish(81.0, size=(64, 48), bounce_rays=16, light=(0, 1, 0))
@@ -280,7 +280,7 @@ def test_light_that_bounces_needs_a_renderer_of_its_own() -> None:
     last = eye.of_type("picture")[-1]
     assert last["bounce"] == 10 and last["reduced"].endswith("0 ambient rays, 10 bounce rays.")
     eye.ack()
-    eye.wish(82.0, size=(64, 48), ambient=4)
+    eye.wish(82.0, size=(64, 48), ambient_rays=4)
     clock.now += GIVE_BACK_SECONDS
     run(scene)
     clock.now += GIVE_BACK_SECONDS
@@ -341,13 +341,13 @@ def test_without_memory_for_ambient_rays_pictures_have_none() -> None:
     scene = make_scene(volume, clock, size=(64, 48))
     eye = Eye(scene)
     for isovalue in (80.0, 81.0):
-        eye.wish(isovalue, size=(64, 48), ambient=16)
+        eye.wish(isovalue, size=(64, 48), ambient_rays=16)
         run(scene)
         eye.ack()
-        assert volume.frames[-1].request.ambient == 0
+        assert volume.frames[-1].request.ambient_rays == 0
     assert [r["rays"] for r in volume.renderers] == [False, True, False], "not tried again"
     scene.receive(eye.client, Budget(1 << 30))
-    eye.wish(82.0, size=(64, 48), ambient=16)
+    eye.wish(82.0, size=(64, 48), ambient_rays=16)
     run(scene)
     assert volume.renderers[-2]["rays"], "tried again with another budget"
 
@@ -356,10 +356,10 @@ def test_without_memory_for_ambient_rays_pictures_have_none() -> None:
     "wish",
     [
         dict(size=(8192, 8192)),
-        dict(size=(8192, 8192), ambient=255),
-        dict(size=(8192, 8192), samples=8, ambient=255),
-        dict(size=(8192, 1), samples=8, ambient=255),
-        dict(size=(40, 40), ambient=255),
+        dict(size=(8192, 8192), ambient_rays=255),
+        dict(size=(8192, 8192), samples=8, ambient_rays=255),
+        dict(size=(8192, 1), samples=8, ambient_rays=255),
+        dict(size=(40, 40), ambient_rays=255),
     ],
 )
 def test_no_picture_has_more_rays_than_the_server_allows(wish: dict[str, Any]) -> None:
@@ -378,24 +378,24 @@ def test_no_picture_has_more_rays_than_the_server_allows(wish: dict[str, Any]) -
     assert eye.of_type("picture")[-1]["stage"] == "lossless" and not eye.of_type("error")
     for frame in volume.frames:
         rays = frame.size[0] * frame.size[1] * frame.request.samples**2
-        assert 0 < rays * (1 + frame.request.ambient) <= limit
+        assert 0 < rays * (1 + frame.request.ambient_rays) <= limit
     for made in volume.renderers:
         assert made["size"][0] * made["size"][1] * made["samples"] ** 2 <= limit
     for head in eye.of_type("picture")[-2:]:
         drawn = next(f for f in reversed(volume.frames) if "rgb" in f.request.outputs)
-        assert (head["size"], head["ambient"]) == (list(drawn.size), drawn.request.ambient)
+        assert (head["size"], head["ambient"]) == (list(drawn.size), drawn.request.ambient_rays)
         assert head["reduced"].startswith("The server draws at most 20,000 rays, 20,000 from")
         assert f"{drawn.size[0]} x {drawn.size[1]} pixels" in head["reduced"]
-        assert f", {drawn.request.ambient} ambient ray" in head["reduced"]
+        assert f", {drawn.request.ambient_rays} ambient ray" in head["reduced"]
 
 
 def test_pictures_within_the_limits_are_drawn_as_they_are() -> None:
     clock, volume = Clock(), FakeVolume()
     scene = make_scene(volume, clock, size=(64, 48), max_rays=64 * 48 * 4 * 17)
     eye = Eye(scene)
-    eye.wish(samples=2, ambient=16)
+    eye.wish(samples=2, ambient_rays=16)
     run(scene)
-    assert (volume.frames[-1].request.samples, volume.frames[-1].request.ambient) == (2, 16)
+    assert (volume.frames[-1].request.samples, volume.frames[-1].request.ambient_rays) == (2, 16)
     assert all(head["reduced"] is None for head in eye.of_type("picture"))
 
 
@@ -403,7 +403,7 @@ def test_camera_rays_have_a_limit_of_their_own() -> None:
     """Each takes memory of the device. The pictures are not drawn: they would take too long."""
     scene = make_scene(FakeVolume(), Clock())
     eye = Eye(scene)
-    eye.wish(size=(8192, 8192), ambient=255)
+    eye.wish(size=(8192, 8192), ambient_rays=255)
     assert eye.client.wish is not None
     plan = scene._renderers.plan(eye.client.wish)
     assert 0.99 * MAX_CAMERA_RAYS < plan.rays <= MAX_CAMERA_RAYS and plan.ambient == 7
@@ -418,7 +418,7 @@ def test_limits_below_1_are_refused(option: str) -> None:
 
 
 @pytest.mark.parametrize("goes", ["leaves", "wants less"])
-@pytest.mark.parametrize("wish", [dict(size=(128, 96)), dict(samples=2), dict(ambient=8)])
+@pytest.mark.parametrize("wish", [dict(size=(128, 96)), dict(samples=2), dict(ambient_rays=8)])
 def test_memory_goes_back_when_it_is_not_needed_any_more(goes: str, wish: dict[str, Any]) -> None:
     clock, volume = Clock(), FakeVolume()
     scene = make_scene(volume, clock, size=(64, 48))

@@ -310,13 +310,15 @@ def test_a_new_wish_cancels_a_frame_with_a_time_budget() -> None:
 
     def before_pass(frame: Drawn) -> None:
         if frame.request.isovalue == 80.0 and frame.passes == 1:
-            eye.wish(81.0, time_budget=0.05)
+            eye.wish(81.0, time_budget_ms=50)
 
     volume.before_pass = before_pass
-    eye.wish(80.0, time_budget=0.05)
+    eye.wish(80.0, time_budget_ms=50)
     run(scene)
     stopped = [
-        (f.request.isovalue, f.stopped) for f in volume.frames if f.request.time_budget is not None
+        (f.request.isovalue, f.stopped)
+        for f in volume.frames
+        if f.request.time_budget_ms is not None
     ]
     assert stopped == [(80.0, True), (81.0, False)]
 
@@ -337,15 +339,18 @@ def test_a_time_budget_needs_no_first_picture() -> None:
     clock, volume = Clock(), FakeVolume()
     scene = make_scene(volume, clock)
     eye = Eye(scene)
-    eye.wish(80.0, time_budget=0.05)
+    eye.wish(80.0, time_budget_ms=50)
     run(scene)
     assert [
-        (f.size, f.request.time_budget, f.request.max_surface_error) for f in volume.frames
-    ] == [((64, 48), 0.05, None)]
+        (f.size, f.request.time_budget_ms, f.request.max_surface_error) for f in volume.frames
+    ] == [((64, 48), 50, None)]
     eye.ack()
     eye.wish(80.0, max_surface_error=0.5)
     run(scene)
-    assert (volume.frames[-1].request.time_budget, volume.frames[-1].request.max_surface_error) == (
+    assert (
+        volume.frames[-1].request.time_budget_ms,
+        volume.frames[-1].request.max_surface_error,
+    ) == (
         None,
         0.5,
     )
@@ -431,7 +436,7 @@ def test_others_get_pictures_while_a_larger_renderer_is_made() -> None:
     scene = Scene(volume, isovalue=80, make_host=lambda v, f, d: host)
     large, other = scene.join(lambda head, data: None), scene.join(post)
     assert large is not None and other is not None
-    scene.receive(large, wish_of(1, ambient=8))
+    scene.receive(large, wish_of(1, ambient_rays=8))
     with changed:
         assert changed.wait_for(lambda: len(volume.renderers) == 2, 60)
     scene.receive(other, wish_of(1))
@@ -462,7 +467,7 @@ def test_the_device_overtakes_the_host() -> None:
     scene = Scene(volume, isovalue=80, make_host=lambda v, f, d: host)
     client = scene.join(post)
     assert client is not None
-    scene.receive(client, wish_of(1, time_budget=1.0))  # within a time: without a first picture
+    scene.receive(client, wish_of(1, time_budget_ms=1000))  # within a time: without a first picture
     assert done.wait(60)
     assert [f.stopped for f in by_host.frames] == [True]
     assert [f.stopped for f in volume.frames if "rgb" in f.request.outputs] == [False]

@@ -30,7 +30,9 @@ def acked(eye: Eye) -> None:
     eye.ack()
 
 
-@pytest.mark.parametrize("more", [dict(samples=2), dict(ambient=16), dict(samples=2, ambient=16)])
+@pytest.mark.parametrize(
+    "more", [dict(samples=2), dict(ambient_rays=16), dict(samples=2, ambient_rays=16)]
+)
 def test_more_rays_come_after_a_sharp_picture(more: dict[str, Any]) -> None:
     """B9: the sharp picture is whole, and stays until the one with more rays is whole."""
     clock = Clock()
@@ -50,8 +52,8 @@ def test_more_rays_come_after_a_sharp_picture(more: dict[str, Any]) -> None:
     stages = [stage for _, stage in eye.pictures]
     assert [s for s in stages if s != "pass"] == ["first", "sharp", "whole", "lossless"]
     assert "pass" not in stages[stages.index("sharp") :]
-    drawn = [(f.request.samples, f.request.ambient) for f in volume.frames]
-    assert drawn[:3] == [(1, 0), (1, 0), (more.get("samples", 1), more.get("ambient", 0))]
+    drawn = [(f.request.samples, f.request.ambient_rays) for f in volume.frames]
+    assert drawn[:3] == [(1, 0), (1, 0), (more.get("samples", 1), more.get("ambient_rays", 0))]
     # Meanwhile the page hears how far the picture is.
     sharp = next(i for i, h in enumerate(eye.heads) if h.get("stage") == "sharp")
     told = [h["percent"] for h in eye.heads[sharp:] if h["type"] == "progress"]
@@ -69,7 +71,7 @@ def test_a_picture_that_a_time_left_coarse_is_finished_at_rest() -> None:
     volume = FakeVolume(before_pass=before_pass, is_coarse=True)
     scene = make_scene(volume, clock)
     eye = Eye(scene)
-    eye.wish(time_budget=0.05)
+    eye.wish(time_budget_ms=50)
     while not volume.frames:
         scene.step()
     for _ in range(3):
@@ -80,17 +82,17 @@ def test_a_picture_that_a_time_left_coarse_is_finished_at_rest() -> None:
         eye.ack()
         clock.now += 10
         run(scene)
-    drawn = [(frame.request.time_budget, frame.size) for frame in volume.frames]
-    assert drawn[:2] == [(0.05, (64, 48)), (None, (64, 48))]
+    drawn = [(frame.request.time_budget_ms, frame.size) for frame in volume.frames]
+    assert drawn[:2] == [(50, (64, 48)), (None, (64, 48))]
     complete = [h["complete"] for h in eye.of_type("picture") if h["stage"] == "whole"]
     assert complete == [False, True] and eye.pictures[-1] == (1, "lossless")
     assert "pass" in [stage for _, stage in eye.pictures]
     # The next wish has its time again; what is finished within it is drawn once.
-    eye.wish(time_budget=0.05)
-    while volume.frames[-1].request.time_budget is None:
+    eye.wish(time_budget_ms=50)
+    while volume.frames[-1].request.time_budget_ms is None:
         scene.step()
     volume.is_coarse = False
-    second = eye.wish(time_budget=0.05)
+    second = eye.wish(time_budget_ms=50)
     count = len(volume.frames)
     run(scene)
     assert len(volume.frames) == count + 1

@@ -184,7 +184,7 @@ class FakeRenderer:
                 > width * height * self._options["samples"] ** 2
             ):
                 raise RuntimeError("the renderer was not made for so many rays")
-            if (request.ambient or request.shadow_rays) and not self._options["rays"]:
+            if (request.ambient_rays or request.shadow_rays) and not self._options["rays"]:
                 raise RuntimeError("the renderer was not made for rays of hits")
             if request.bounce_rays and not self._options["bounce"]:
                 raise RuntimeError("the renderer was not made for light that bounces")
@@ -201,12 +201,12 @@ class FakeRenderer:
         if "bounds" in request.outputs and request.has_labels:
             raise RuntimeError("labels are drawn without an error")
         image_error = request.max_image_error
-        if request.num_surfaces and (image_error or request.time_budget):
-            raise RuntimeError("surfaces are drawn without max_image_error and time_budget")
+        if request.num_surfaces and (image_error or request.time_budget_ms):
+            raise RuntimeError("surfaces are drawn without max_image_error and time_budget_ms")
         if request.has_labels and request.max_surface_error:
             raise RuntimeError("labels are drawn without max_surface_error")
         if image_error and (
-            request.max_surface_error or request.time_budget or request.voxel_pixels
+            request.max_surface_error or request.time_budget_ms or request.voxel_pixels
         ):
             raise RuntimeError("max_image_error chooses the detail, and is kept alone")
         if request.voxel_pixels and not self._options["levels"]:
@@ -246,7 +246,7 @@ class FakeRenderer:
             alpha = np.where(np.isfinite(depth), 255, 0).astype(np.uint8)[:, :, None]
             if "depth" not in request.outputs:
                 return FakeImage(image, statistics, True, np.dstack((image, alpha)))
-        is_whole = not (self._volume.is_coarse and request.time_budget)
+        is_whole = not (self._volume.is_coarse and request.time_budget_ms)
         return FakeImage(image, statistics, is_whole, np.dstack((image, alpha)), depth, bounds)
 
     def _chosen(self, request: Request) -> dict[str, Any] | None:

@@ -51,7 +51,7 @@ class Extent:
         return Extent(
             request.size,
             request.samples,
-            request.ambient,
+            request.ambient_rays,
             request.shadow_rays,
             request.bounce_rays,
             request.max_image_error is not None,
@@ -110,7 +110,7 @@ class Extent:
             camera=camera,
             size=self.size,
             samples=self.samples,
-            ambient=self.ambient,
+            ambient_rays=self.ambient,
             shadow_rays=self.shadow,
             bounce_rays=self.bounce,
             max_image_error=wish.max_image_error if self.chooses else None,

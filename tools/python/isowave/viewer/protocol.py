@@ -522,9 +522,9 @@ def _read_wish(content: dict[str, Any]) -> Wish:
         slice_map=_slice_map(content["slice_map"]),
         outputs=("rgb",),
         **_error(content),
-        time_budget=None if time_budget is None else time_budget / 1000,
+        time_budget_ms=time_budget,
         voxel_pixels=_voxel_pixels(content, surfaces),
-        ambient=_integer(content["ambient"], 0, MAX_AMBIENT, "ambient"),
+        ambient_rays=_integer(content["ambient"], 0, MAX_AMBIENT, "ambient"),
         progress=False,
     )
     step = _integer(content["step"], 0, MAX_ID, "step")

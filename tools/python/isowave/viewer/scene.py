@@ -356,11 +356,11 @@ class Scene:
         request = replace(
             extent.request(wish.request, camera),
             outputs=("rgb",) if stage is Stage.FIRST else ("rgb", "depth"),
-            time_budget=None if client.to_the_end else wish.request.time_budget,
+            time_budget_ms=None if client.to_the_end else wish.request.time_budget_ms,
             on_pass=lambda so_far: self._on_pass(frame, so_far),
         )
         if frame.by_host:  # full detail until the device draws, not interrupted by a time
-            request = replace(request, max_surface_error=None, by="proof", time_budget=None)
+            request = replace(request, max_surface_error=None, by="proof", time_budget_ms=None)
         if frame.by_host or self._steps.volume.num_levels == 1:
             request = replace(request, voxel_pixels=0.0)
         image = renderer.draw(request)
@@ -389,7 +389,7 @@ class Scene:
             elif stage is Stage.SHARP:
                 client.stage, client.due = Stage.WHOLE, now + REST_SECONDS
                 client.under, client.whole_seconds = None, now - frame.began
-            elif request.time_budget is not None and not image.complete:
+            elif request.time_budget_ms is not None and not image.complete:
                 client.stage, client.due = Stage.WHOLE, now + REST_SECONDS
                 client.under, client.to_the_end = drawn, True
             else:
@@ -524,7 +524,7 @@ class Scene:
             outputs=("depth", "bounds"),
             max_surface_error=None if error is None else error * pixels,
             voxel_pixels=voxel_pixels * pixels if self._steps.volume.num_levels > 1 else 0.0,
-            time_budget=None,
+            time_budget_ms=None,
             color_map=None,
             on_pass=lambda so_far: client.wish is wish and not self._closing,
         )

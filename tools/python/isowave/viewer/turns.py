@@ -46,7 +46,7 @@ DRAWN: Final = (Stage.FIRST, Stage.SHARP, Stage.WHOLE)  # by the renderer, for a
 def after_first(wish: Wish) -> Stage:
     """The stage after the first picture. More rays are added to a picture that is sharp."""
     request = wish.request
-    is_kept = request.max_image_error is not None or request.time_budget is not None
+    is_kept = request.max_image_error is not None or request.time_budget_ms is not None
     return Stage.SHARP if Extent.of(request).is_refined and not is_kept else Stage.WHOLE
 
 
@@ -90,7 +90,7 @@ class Client:
         """The next wish, which ends the one before. Raises ProtocolError."""
         if self.wish is not None and wish.id <= self.wish.id:
             raise ProtocolError("the numbers of wishes must grow")
-        skip_first = self.whole_seconds < QUICK_SECONDS or wish.request.time_budget is not None
+        skip_first = self.whole_seconds < QUICK_SECONDS or wish.request.time_budget_ms is not None
         self.wish, self.camera = wish, wish.request.camera
         self.stage = after_first(wish) if skip_first else Stage.FIRST
         self.gave_way, self.lossless, self.due = 0, None, -math.inf
@@ -153,7 +153,7 @@ class Frame:
     def is_better_than_before(self) -> bool:
         """Whether a pass shows more than the page does; pictures within a time do by themselves."""
         request = self.wish.request
-        is_shown = self.client.under is not None or request.time_budget is not None
+        is_shown = self.client.under is not None or request.time_budget_ms is not None
         return self.stage is not Stage.FIRST and is_shown and not request.transparent
 
 
