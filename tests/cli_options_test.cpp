@@ -73,6 +73,10 @@ TEST(CliOptions, EmptyValuesAreRefused) {
 TEST(CliOptions, UnexpectedArgumentsAreNamedInTheirOrder) {
   expect_one_line_error(kRender + "--upwards 0 0 1", "unexpected arguments --upwards 0 0 1: see");
   expect_one_line_error("man page", "unexpected argument page: see --help");
+  // A shell makes several files of a pattern.
+  const std::string file = ISOWAVE_TEST_DATA "/fuel_64x33x32_uint8.raw.gz";
+  expect_one_line_error(kRender + file, ": put the pattern of a series in quotes: 'run_*.nrrd'");
+  expect_one_line_error("info " + file + " " + file, ": see --help");
 }
 
 TEST(CliOptions, OnePassIsNamedSo) {

@@ -231,6 +231,13 @@ TEST(Cli, UnwritableOutputIsOneLine) {
   EXPECT_EQ(folder.num_files(), 1u);
 }
 
+TEST(Cli, FoldersAreForThePythonPackage) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "layers");
+  for (const std::string command : {"render ", "info ", "convert -o a.zfp "})
+    expect_one_line_error(command + quoted(folder / "layers"), "folders of TIFF and DICOM");
+}
+
 TEST(Cli, FullDiskLeavesNothingAndKeepsTheOldFile) {
   const TemporaryFolder folder;
   write_file(folder / "a.raw", std::string_view("old"));

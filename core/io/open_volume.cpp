@@ -46,6 +46,11 @@ bool is_of_python(const fs::path &path) {
       path.string());
 }
 
+std::shared_ptr<const InputFile> open_volume_file(const fs::path &path) {
+  if (fs::is_directory(path)) refuse_kind(path);
+  return std::make_shared<const InputFile>(path);
+}
+
 /// Nothing for kinds of files that have none.
 std::optional<VolumeHeader> read_header(const std::shared_ptr<const InputFile> &file) {
   const fs::path &path = file->path();
@@ -59,7 +64,7 @@ std::optional<VolumeHeader> read_header(const std::shared_ptr<const InputFile> &
 }  // namespace
 
 void visit_voxel_files(const fs::path &path, const std::function<void(const fs::path &)> &visit) {
-  const std::optional<VolumeHeader> header = read_header(std::make_shared<const InputFile>(path));
+  const std::optional<VolumeHeader> header = read_header(open_volume_file(path));
   if (!header) return visit(path);
   visit(header->voxels.file->path());
   const VoxelFiles *files = header->voxels.files.get();
@@ -68,7 +73,7 @@ void visit_voxel_files(const fs::path &path, const std::function<void(const fs::
 }
 
 std::optional<std::uint32_t> num_steps(const fs::path &path) {
-  const std::optional<VolumeHeader> header = read_header(std::make_shared<const InputFile>(path));
+  const std::optional<VolumeHeader> header = read_header(open_volume_file(path));
   if (!header || header->voxels.num_steps == 1) return std::nullopt;
   return header->voxels.num_steps;
 }
@@ -80,8 +85,7 @@ void check_has_step(const fs::path &path, std::optional<std::uint32_t> step) {
 
 std::unique_ptr<VolumeReader> open_volume(const fs::path &path, const RawOverrides &overrides,
                                           std::optional<std::uint32_t> step) {
-  if (fs::is_directory(path)) refuse_kind(path);
-  const auto file = std::make_shared<const InputFile>(path);
+  const std::shared_ptr<const InputFile> file = open_volume_file(path);
   if (!step) step = overrides.step;
   if (has_ending(path, {".raw", ".raw.gz"})) {
     check_has_step(path, step);

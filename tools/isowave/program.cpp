@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <new>
@@ -67,11 +69,18 @@ std::string text_of(const CLI::RequiredError &error, const CLI::App &app) {
   return fmt::format("{}; '{}' is none: see --help", error.what(), unknown.front());
 }
 
-/// The arguments that no command takes, in their order.
+/// The arguments that no command takes, in their order. A shell makes files of a pattern.
 std::string text_of_extras(const CLI::App &app) {
   const std::vector<std::string> extras = app.remaining(true);
-  return fmt::format("unexpected argument{} {}: see --help", plural(extras.size(), "", "s"),
-                     fmt::join(extras, " "));
+  const auto is_file = [](const std::string &name) {
+    std::error_code failure;
+    return std::filesystem::is_regular_file(name, failure);
+  };
+  return fmt::format("unexpected argument{} {}: {}", plural(extras.size(), "", "s"),
+                     fmt::join(extras, " "),
+                     app.got_subcommand("render") && std::ranges::all_of(extras, is_file)
+                         ? "put the pattern of a series in quotes: 'run_*.nrrd'"
+                         : "see --help");
 }
 
 /// The program and the subcommand that was asked for: "isowave bench pareto".

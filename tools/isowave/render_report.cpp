@@ -139,10 +139,10 @@ nlohmann::ordered_json report_error(double max_surface_error, const CompressedVo
                                ? 100.0
                                : 100.0 * double(summary.num_certified) / double(summary.num_pixels);
   fmt::print(
-      "  within {} pixels of the true surface{}: {:.2f} % of {} {} (bound: median {:.3g}, p99 "
+      "  within {} {} of the true surface{}: {:.2f} % of {} {} (bound: median {:.3g}, p99 "
       "{:.3g}); {} uncertain\n"
       "  {}; {}, bounded in {:.0f} ms\n",
-      max_surface_error,
+      max_surface_error, plural(max_surface_error, "pixel", "pixels"),
       volume.errors_are_stated ? ", if the errors are right that the file states" : "", certified,
       with_commas(summary.num_pixels), plural(summary.num_pixels, "ray", "rays"), summary.median,
       summary.p99, with_commas(summary.num_uncertain), text_of_detail(choice.detail),

@@ -24,13 +24,17 @@ def may_annotate(arguments: Sequence[str]) -> bool:
     return arguments[:1] == ["render"] and not names.isdisjoint(OPTIONS)
 
 
-def start(command: Sequence[Any]) -> subprocess.Popen[bytes]:
-    """Starts the program, and a thread that draws for it: tools/isowave/annotator.hpp."""
+def start(command: Sequence[Any], reads_output: bool = False) -> subprocess.Popen[bytes]:
+    """Starts the program, and a thread that draws for it: tools/isowave/annotator.hpp.
+
+    reads_output  its `stdout` can be read; otherwise it goes where that of this process goes
+    """
     questions, answers = os.pipe(), os.pipe()
     theirs = (questions[1], answers[0])
     variables = {**os.environ, VARIABLE: ":".join(f"/dev/fd/{end}" for end in theirs)}
     try:
-        process = subprocess.Popen(command, pass_fds=theirs, env=variables)
+        output = subprocess.PIPE if reads_output else None
+        process = subprocess.Popen(command, stdout=output, pass_fds=theirs, env=variables)
     finally:
         for end in theirs:
             os.close(end)

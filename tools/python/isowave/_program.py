@@ -6,12 +6,13 @@ annotations.
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from isowave import _annotator, _loader
@@ -76,9 +77,12 @@ def run_as_child(arguments: Sequence[str], files: Sequence[Given], scene: GivenS
                 refuse_to_replace(scene, arguments)
             changed = with_nrrd(arguments, files, folder, names_of, scene)
             saved = take_option([*changed], "--save-scene")
-            with _annotator.start([PROGRAM, *changed]) as process:
+            says_file = arguments[0] == "info"
+            with _annotator.start([PROGRAM, *changed], says_file) as process:
                 signal.signal(signal.SIGINT, lambda *_: None)  # Ctrl-C ends the program, too
                 signal.signal(signal.SIGTERM, lambda *_: process.terminate())
+                if process.stdout is not None:
+                    print_with_names(process.stdout, arguments, files, names_of)
                 status = process.wait()
             if saved is not None and status == 0:
                 name_real_files(saved, names_of)
@@ -88,3 +92,20 @@ def run_as_child(arguments: Sequence[str], files: Sequence[Given], scene: GivenS
     except KeyboardInterrupt:
         return 130
     return status if status >= 0 else 128 - status
+
+
+def print_with_names(
+    lines: Iterable[bytes], arguments: Sequence[str], files: Sequence[Given], nrrd: Iterable[str]
+) -> None:
+    """Prints what `info` says, with the names of files in place of those of NRRD files."""
+    names = {}
+    for path, each in zip(nrrd, files):
+        last = arguments[each.at + each.count - 1]
+        name = each.path if each.count == 1 else f"{each.path} ... {last}"
+        name = json.dumps(name)[1:-1] if "--json" in arguments else name
+        names[os.fsencode(path)] = os.fsencode(name)
+    for line in lines:
+        for path_bytes, name_bytes in names.items():
+            line = line.replace(path_bytes, name_bytes)
+        sys.stdout.buffer.write(line)
+        sys.stdout.flush()

@@ -117,6 +117,7 @@ def test_the_program_reads_files_of_packages(folder):
     done = command("info", "--json", folder / "a.zarr", *more)
     assert done.returncode == 0, done.stderr
     info = json.loads(done.stdout)
+    assert info["file"] == str(folder / "a.zarr")
     assert info["dims"] == [*VOXELS.shape[::-1]] and info["type"] == "int16"
     assert info["spacing"] == pytest.approx(SPACING[::-1])
     assert info["origin"] == pytest.approx(ORIGIN[::-1])
