@@ -164,7 +164,7 @@ nb::object sample(const PyVolume &self, std::uint64_t max_voxels) {
 
 nb::dict extract(const PyVolume &self, const std::string &device, double isovalue,
                  std::uint32_t level, bool normals, bool exact_vertices, bool closed,
-                 std::uint64_t largest, std::uint64_t memory_budget,
+                 std::uint64_t largest, double simplify, std::uint64_t memory_budget,
                  const std::optional<nb::callable> &progress) {
   Callbacks callbacks;
   isowave::ExtractOptions options{
@@ -173,6 +173,7 @@ nb::dict extract(const PyVolume &self, const std::string &device, double isovalu
       .vertices = exact_vertices ? isowave::VertexPlaces::kExact : isowave::VertexPlaces::kApart,
       .closed = closed,
       .largest = largest,
+      .simplify = simplify,
       .memory_budget = memory_budget};
   options.progress = [&](std::string_view what, double done) {
     const bool goes_on = callbacks.run([&] {
@@ -188,6 +189,7 @@ nb::dict extract(const PyVolume &self, const std::string &device, double isovalu
   result["vertices"] = to_numpy<double>(std::move(mesh.vertices), {num_vertices, 3});
   result["faces"] = to_numpy<std::uint32_t>(std::move(mesh.triangles), {num_faces, 3});
   if (normals) result["normals"] = to_numpy<float>(std::move(mesh.normals), {num_vertices, 3});
+  result["simplify_error"] = mesh.simplify_error;
   return result;
 }
 
@@ -271,7 +273,8 @@ void add_volumes(nb::module_ &m) {
           [](const PyVolume &v, const std::filesystem::path &path) { v.volume->save(path); },
           "path"_a, nb::call_guard<WithoutGil>())
       .def("extract", &extract, "device"_a, "isovalue"_a, "level"_a, "normals"_a,
-           "exact_vertices"_a, "closed"_a, "largest"_a, "memory_budget"_a, "progress"_a.none());
+           "exact_vertices"_a, "closed"_a, "largest"_a, "simplify"_a, "memory_budget"_a,
+           "progress"_a.none());
   m.def("box_turntable", &box_turntable, "grid"_a, "num_views"_a, "side"_a, "up"_a.none(), "zoom"_a,
         "size"_a);
   m.def("fitted", &fitted, "camera"_a, "grid"_a, "size"_a);

@@ -104,9 +104,10 @@ class Volume:
         exact_vertices: bool,
         closed: bool,
         largest: int,
+        simplify: float,
         memory_budget: int,
         progress: Callable[[str, float], object] | None,
-    ) -> dict[str, NDArray[Any]]: ...
+    ) -> dict[str, Any]: ...
 
 def compress(
     read: Callable[[int, int], NDArray[Any]],

@@ -28,6 +28,8 @@ class Mesh:
     faces: npt.NDArray[np.uint32]
     #: float32 (n, 3), world space: of length 1, away from larger values. None: not asked for.
     normals: npt.NDArray[np.float32] | None
+    #: About the largest distance from the mesh before it was simplified [world units].
+    simplify_error: float = 0.0
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes a .ply, .stl, .obj, .vtp, .gltf or .glb file, whole or not at all.

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from isowave import _core, viewer
-from isowave._checked import Isovalue, flag, reversed_axes, whole
+from isowave._checked import Isovalue, flag, number, reversed_axes, whole
 from isowave._camera import Camera, turntable_of
 from isowave._handed_on import takes
 from isowave._image import Image
@@ -332,6 +332,7 @@ class Volume(Voxels):
         vertices: str = "apart",
         closed: bool = False,
         largest: int | None = None,
+        simplify: float = 1.0,
         device: str | int | None = None,
         memory_budget: int | None = None,
         progress: bool | Progress | None = None,
@@ -360,6 +361,9 @@ class Volume(Voxels):
             as if values lay below the isovalue all around. Not with voxels without data.
         largest
             Number of parts of the surface that are kept, those with the largest areas. None: all.
+        simplify
+            About this share of the triangles is left, above 0, up to 1, by meshoptimizer:
+            Mesh.simplify_error. Closed meshes stay closed.
         device
             "gpu", "cpu", an index, or a part of a name; None: $ISOWAVE_DEVICE, else the first GPU,
             else an OpenCL device for the CPU.
@@ -381,11 +385,13 @@ class Volume(Voxels):
                 vertices == "exact",
                 flag("closed", closed),
                 0 if largest is None else whole("largest", largest, 2**32),
+                number("simplify", simplify),
                 0 if memory_budget is None else whole("memory_budget", memory_budget, 2**64 - 1),
                 told,
             )
         places = positions_of(self, found["vertices"])
-        return Mesh(places, found["faces"], found["normals"] if normals else None)
+        normals_of_mesh = found["normals"] if normals else None
+        return Mesh(places, found["faces"], normals_of_mesh, found["simplify_error"])
 
     def verify(
         self,

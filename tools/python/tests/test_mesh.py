@@ -162,6 +162,12 @@ def test_closed_meshes_and_their_largest_parts():
     assert abs((volume_of(closed) - volume_of(largest)) / cut - 1) < 0.04
     with pytest.raises(isowave.Error, match="leave out exact vertices"):
         volume.extract(5, closed=True, vertices="exact")
+    simple = volume.extract(5, closed=True, largest=1, simplify=0.25)
+    assert is_watertight(simple) and abs(volume_of(simple) / ball - 1) < 0.05
+    assert 0.2 < len(simple.faces) / len(largest.faces) < 0.3
+    assert 0 < simple.simplify_error < 1 and largest.simplify_error == 0
+    with pytest.raises(isowave.Error, match="give a share above 0, up to 1"):
+        volume.extract(5, simplify=0)
 
 
 def test_vertices_are_apart_unless_asked_for_exactly():
