@@ -65,6 +65,7 @@ class Cameras {
   paste(text) {
     const { view } = this;
     try {
+      view.history.hold(false);
       view.change({ camera: readCamera(text) });
       return true;
     } catch (error) {

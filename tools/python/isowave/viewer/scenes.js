@@ -243,6 +243,7 @@ class SceneFiles {
   use(fields) {
     try {
       const { volume, labels } = this.view;
+      this.view.history.hold(false); // undo gives the state before back
       this.view.change(readScene(fields, volume?.field, labels.isUseful, volume?.box));
       if (this.sent) this.keep(this.sent.name, this.sent.text);
       this.sent = null;
