@@ -337,7 +337,7 @@ class Volume(Voxels):
         memory_budget: int | None = None,
         progress: bool | Progress | None = None,
     ) -> Mesh:
-        """Extracts the isosurface as triangles, by marching cubes on the device.
+        """Extracts the isosurface as triangles, by marching cubes.
 
         The result is in memory. `isowave extract` writes surfaces larger than memory to a file.
 
@@ -365,10 +365,12 @@ class Volume(Voxels):
             About this share of the triangles is left, above 0, up to 1, by meshoptimizer:
             Mesh.simplify_error. Closed meshes stay closed.
         device
-            "gpu", "cpu", an index, or a part of a name; None: $ISOWAVE_DEVICE, else the first GPU,
-            else an OpenCL device for the CPU.
+            "host": this process extracts, without OpenCL. "gpu", "cpu", an index, or a part of a
+            name: an OpenCL device. None: $ISOWAVE_DEVICE, else the first GPU, else an OpenCL
+            device for the CPU. The mesh has the same bits.
         memory_budget
-            Most device memory to take [bytes]; None: three quarters of it.
+            Most device memory to take [bytes]; None: three quarters of it. On the host, of value
+            ranges and decoded blocks; None: a quarter of its memory.
         progress
             As compress() has it.
         """

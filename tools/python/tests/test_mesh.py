@@ -166,6 +166,9 @@ def test_closed_meshes_and_their_largest_parts():
     assert is_watertight(simple) and abs(volume_of(simple) / ball - 1) < 0.05
     assert 0.2 < len(simple.faces) / len(largest.faces) < 0.3
     assert 0 < simple.simplify_error < 1 and largest.simplify_error == 0
+    by_host = volume.extract(5, closed=True, largest=1, simplify=0.25, device="host")
+    assert np.array_equal(by_host.vertices, simple.vertices)
+    assert np.array_equal(by_host.faces, simple.faces)
     with pytest.raises(isowave.Error, match="give a share above 0, up to 1"):
         volume.extract(5, simplify=0)
 
