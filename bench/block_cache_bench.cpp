@@ -34,7 +34,7 @@ class CacheInput {
                                       static_cast<std::uint32_t>(num_needed()), num_pairs),
                kGroupSize) {
     FrameParams params = cube_params(static_cast<std::uint32_t>(key_bits));
-    params.schedule.table_groups = cache_.table_groups;
+    params.schedule.cache_slots = cache_.num_slots;
     rays_.frame = params;
     for (int set = 0; set < 2; ++set) {
       open_pass(true);
@@ -71,7 +71,7 @@ class CacheInput {
   void classify() { cache_.classify(rays_); }
   void count_touched() { cache_.count_touched(rays_, true); }
   void clear() { cache_.clear(); }
-  double num_entries() const { return 8.0 * cache_.table_groups; }
+  double num_slots() const { return cache_.num_slots; }
   /// Gives slots to requests that have none yet.
   void settle() {
     if (requested_) assign();
@@ -110,26 +110,25 @@ void use_cache(benchmark::State &state, Part part, Distribution distribution) {
       in.open_pass(true);
       in.request();
     };
-    // Read: stamps, requests, victims. Written: victims, both page table entries, slot, stamp.
+    // Read: stamps, requests, victims. Written: victims, both entries of the table, slot, stamp.
     measure(state, {needed, 32 * needed}, prepare, [&] { in.assign(); });
   } else if (part == Part::kClassify) {
-    // Read: values, blocks of slots. Written: bits of voxels, changing cells of the table.
-    const double bytes =
-        needed * double(slot_bytes(SlotType::kFloat32) + sizeof(uint) + 8) + 8 * in.num_entries();
+    // Read: values, blocks of slots. Written: bits of voxels, changing cells.
+    const double bytes = needed * double(slot_bytes(SlotType::kFloat32) + sizeof(uint) + 16);
     measure(
         state, {needed, bytes}, [] {}, [&] { in.classify(); });
   } else if (part == Part::kTouched) {
     measure(
         state, {needed, 8 * needed}, [] {}, [&] { in.count_touched(); });
   } else if (part == Part::kClear) {
-    // Written: the table, and block, stamp and place in the list of free slots of each slot.
+    // Written: of each slot block, stamp, place in the list of free slots, a page and its count;
+    // and the directory's words of what was cached.
     const auto fill = [&] {
       in.open_pass(true);
       in.request();
       in.settle();
     };
-    measure(state, {needed, 12 * needed + sizeof(BlockEntry) * in.num_entries()}, fill,
-            [&] { in.clear(); });
+    measure(state, {needed, 4 * needed + 48 * in.num_slots()}, fill, [&] { in.clear(); });
   } else {
     const bool cold = part == Part::kRequestCold;
     measure(

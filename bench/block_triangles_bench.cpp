@@ -38,7 +38,7 @@ void count_triangles(benchmark::State &state) {
   const double blocks = in.num_listed;
   ocl::Buffer<uint> counts(Session::current().device(), "counts", in.num_listed + 1);
   measure(
-      state, {blocks, blocks * (8 * (sizeof(BlockEntry) + sizeof(ulong)) + sizeof(uint))}, [] {},
+      state, {blocks, blocks * (8 * (2 * sizeof(uint) + sizeof(ulong)) + sizeof(uint))}, [] {},
       [&] { in.count_into(counts); });
 }
 

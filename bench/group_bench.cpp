@@ -24,7 +24,7 @@ struct GroupInput {
               kGroupSize),
         group(device, {num_pairs, num_slots, kGroupSize, how}) {
     FrameParams params = cube_params(kKeyBits);
-    params.schedule.table_groups = cache.table_groups;
+    params.schedule.cache_slots = cache.num_slots;
     rays.frame = params;
     rays.pair_block_ids.write(pairs.pair_block_ids);
     open_pass();

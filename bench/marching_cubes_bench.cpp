@@ -9,7 +9,7 @@ void count_triangles(benchmark::State &state) {
   auto &in = input<SurfaceRig>(state.range(0), Gradients::kNone);
   const double blocks = in.num_listed;
   measure(
-      state, {blocks, blocks * (8 * (sizeof(BlockEntry) + sizeof(ulong)) + sizeof(BlockEdges) + 8)},
+      state, {blocks, blocks * (8 * (2 * sizeof(uint) + sizeof(ulong)) + sizeof(BlockEdges) + 8)},
       [] {}, [&] { in.count(); });
 }
 

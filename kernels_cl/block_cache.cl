@@ -1,17 +1,19 @@
 /// block_cache.cl -- gives cache slots to the blocks that a pass needs (Sec. 3.4, 3.5).
 ///
 /// table: block -> slot (block_table.h). slot_block_ids [slots]: the block in each slot, or
-/// ISO_INVALID_ID. slot_stamps [slots]: when it was used last (slot_stamps.h). free_slots [slots]:
-/// the first cache.free_count hold no block. requested_bits: one per block, 0 between passes.
+/// ISO_INVALID_ID. changing [slots]: the block's cells in which inside changes, once known.
+/// slot_stamps [slots]: when it was used last (slot_stamps.h). free_slots [slots]: the first
+/// cache.free_count hold no block. requested_bits: one per block, 0 between passes.
 ///
 /// A pass: cache_request, or march (stamp what is cached, list what is not) -> where free slots may
-/// not suffice: cache_rank -> cache_select (how many, which) -> cache_evict -> cache_rebuild ->
-/// then cache_assign. All cost O(slots) or O(requests), never O(blocks). The slot that a block
-/// gets is left to chance; no hit depends on it.
+/// not suffice: cache_rank -> cache_select (how many, which) -> cache_evict -> then cache_assign.
+/// All cost O(slots) or O(requests), never O(blocks). The slot that a block gets is left to chance;
+/// no hit depends on it.
 ///
 /// Progress is certain: the first block of the first active ray is served before all others. If old
 /// slots are too few even for it, slots that other rays use in this very pass are taken; those rays
 /// wait for the next. (Not in the paper, whose cache grows instead.)
+#include "device/block_pages.h"
 #include "device/block_requests.h"
 #include "device/ray_pairs.h"
 #include "portable/label_table.h"
@@ -20,23 +22,6 @@
 
 ISO_INLINE uint listed_count(global const PassCounts *counts, uint capacity) {
   return min(counts->requested_count, capacity);
-}
-
-/// Adds a key to the table, or finds the one it has.
-ISO_INLINE void table_insert(const FrameParams *frame, global BlockEntry *table, uint block_id,
-                             uint slot, ulong changing) {
-  const uint i = table_key(frame, table, block_coords(frame, block_id), block_id);
-  table[i].slot = slot;
-  table[i].changing_low = (uint)changing;
-  table[i].changing_high = (uint)(changing >> 32);
-}
-
-/// Marks the block as not cached; its key stays.
-ISO_INLINE void table_evict(const FrameParams *frame, global BlockEntry *table, uint block_id) {
-  const BlockCoords b = block_coords(frame, block_id);
-  uint i = table_home(frame, b.x, b.y, b.z);
-  while (table[i].block_id != block_id) i = table_next(frame, i);
-  table[i].slot = ISO_BLOCK_ABSENT;
 }
 
 /// Whether the pair as far along the ray before has the same block.
@@ -60,7 +45,7 @@ ISO_INLINE int asked_beside(const FrameParams *frame, global const uint *pair_bl
 /// Launch  grid-stride over pair slots
 kernel void cache_request(const FrameParams frame_params, global PassCounts *counts,
                           global const uint *pair_block_ids, global const uint *pair_begins,
-                          global const uint *pair_rays, global const BlockEntry *table,
+                          global const uint *pair_rays, global const uint *table,
                           global uint *slot_stamps, global uint *requested_bits,
                           global uint *request_block_ids, uint capacity, global CacheState *cache) {
   const FrameParams *frame = &frame_params;
@@ -101,18 +86,17 @@ kernel void cache_request(const FrameParams frame_params, global PassCounts *cou
 /// grid, but march stamps only the block itself: one stamp costs a GPU less in each pass than
 /// eight. So a block counts as read when a block was read whose dual grid it is in, and may have
 /// been read if that block was needed since.
-ISO_INLINE uint last_use(const FrameParams *frame, global const BlockEntry *table,
+ISO_INLINE uint last_use(const FrameParams *frame, global const uint *table,
                          global const uint *slot_stamps, uint block_id, uint stamp) {
   const BlockCoords b = block_coords(frame, block_id);
   const uint below_x = b.x != 0, below_y = b.y != 0, below_z = id_layer(frame, b.z) != 0;
   const uint below = below_x + 2 * below_y + 4 * below_z; /* the corner that the block itself is */
-  BlockEntry entries[8];
-  uint latest = stamp;
-  find_dual_grid(frame, table, b.x - below_x, b.y - below_y, b.z - below_z, entries);
+  uint slots[8], latest = stamp;
+  find_dual_grid(frame, table, b.x - below_x, b.y - below_y, b.z - below_z, slots);
   ISO_UNROLL
   for (uint corner = 0; corner < 8; ++corner) {
-    if ((corner & ~below) == 0 && entries[corner].slot != ISO_BLOCK_ABSENT) {
-      const uint read = as_read_stamp(slot_stamps[entries[corner].slot]);
+    if ((corner & ~below) == 0 && slots[corner] != ISO_BLOCK_ABSENT) {
+      const uint read = as_read_stamp(slot_stamps[slots[corner]]);
       if ((int)(read - latest) > 0) latest = read;
     }
   }
@@ -122,41 +106,30 @@ ISO_INLINE uint last_use(const FrameParams *frame, global const BlockEntry *tabl
 /// Ranks the slots with blocks for eviction, unless free slots suffice.
 ///
 /// In      rank_histogram [ISO_EVICTION_RANKS]: 0
-/// Out     slot_ranks [slots]: eviction_rank(); rank_histogram: how many have each; slot_changing
-///         [slots], if the table may be rebuilt: what it knows of the blocks' cells
+/// Out     slot_ranks [slots]: eviction_rank(); rank_histogram: how many have each
 /// Launch  grid-stride over slots
-///
-/// Without slot_changing, a view that comes again could need blocks that were not worth keeping.
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_rank(
     const FrameParams frame_params, global const PassCounts *counts, uint num_slots, uint capacity,
-    global const CacheState *cache, global const BlockEntry *table,
-    global const uint *slot_block_ids, global const uint *slot_stamps, global uchar *slot_ranks,
-    global ulong *slot_changing, global uint *rank_histogram) {
+    global const CacheState *cache, global const uint *table, global const uint *slot_block_ids,
+    global const uint *slot_stamps, global uchar *slot_ranks, global uint *rank_histogram) {
   const FrameParams *frame = &frame_params;
   local uint histogram[ISO_EVICTION_RANKS];
   /* Never a return before a barrier, not even of whole groups: PoCL 3.1 then corrupts memory. */
   const uint requested = listed_count(counts, capacity);
   const int is_short = requested > cache->free_count;
-  const int may_rebuild = table_is_full(frame, cache->table_count + requested);
-  const uint counted_slots = is_short || may_rebuild ? num_slots : 0;
+  const uint counted_slots = is_short ? num_slots : 0;
   for (uint rank = get_local_id(0); rank < ISO_EVICTION_RANKS; rank += ISO_GROUP_SIZE)
     histogram[rank] = 0;
   barrier(CLK_LOCAL_MEM_FENCE);
   for (uint slot = get_global_id(0); slot < counted_slots; slot += get_global_size(0)) {
     const uint block_id = slot_block_ids[slot], stamp = slot_stamps[slot];
     if (block_id != ISO_INVALID_ID) {
-      if (is_short) {
-        uint rank = eviction_rank(stamp, counts);
-        if (rank >= ISO_RANKS_OF_FRAME) /* older, so that the others decide whether it is freed
-                                           before this frame's */
-          rank = eviction_rank(last_use(frame, table, slot_stamps, block_id, stamp), counts);
-        slot_ranks[slot] = (uchar)rank;
-        atomic_inc(&histogram[rank]);
-      }
-      if (may_rebuild) {
-        const BlockCoords b = block_coords(frame, block_id);
-        slot_changing[slot] = changing_of(&table[find_entry(frame, table, b.x, b.y, b.z)]);
-      }
+      uint rank = eviction_rank(stamp, counts);
+      if (rank >= ISO_RANKS_OF_FRAME) /* older, so that the others decide whether it is freed
+                                         before this frame's */
+        rank = eviction_rank(last_use(frame, table, slot_stamps, block_id, stamp), counts);
+      slot_ranks[slot] = (uchar)rank;
+      atomic_inc(&histogram[rank]);
     }
   }
   barrier(CLK_LOCAL_MEM_FENCE);
@@ -170,8 +143,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_ra
 ///
 /// Out     missing [8]: those
 ISO_INLINE uint find_first_blocks(const FrameParams *frame, global const CacheState *cache,
-                                  global const BlockEntry *table, global uint *slot_stamps,
-                                  uint stamp, local uint *missing) {
+                                  global const uint *table, global uint *slot_stamps, uint stamp,
+                                  local uint *missing) {
   const uint block_id = cache->first_block_id; /* invalid: that ray needs nothing */
   uint num_missing = 0;
   for (uint corner = 0; corner < 8 && block_id != ISO_INVALID_ID; ++corner) {
@@ -219,7 +192,7 @@ ISO_INLINE void put_first(const FrameParams *frame, local const uint *blocks, lo
 /// Launch  one work-group
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_select(
     const FrameParams frame_params, global const PassCounts *counts, uint num_slots,
-    global const BlockEntry *table, global uint *slot_stamps, global uint *requested_bits,
+    global const uint *table, global uint *slot_stamps, global uint *requested_bits,
     global uint *request_block_ids, uint capacity, global uint *rank_histogram,
     global CacheState *cache) {
   const FrameParams *frame = &frame_params;
@@ -271,24 +244,17 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_se
     cache->num_evicted = 0;
     cache->num_cutoff = 0;
     cache->free_count = num_free + evicted;
-    cache->rebuild = requested != 0 && table_is_full(frame, cache->table_count + granted);
-    if (cache->rebuild) cache->table_count = num_slots - cache->free_count;
   }
 }
 
-/// Frees the selected slots; empties the table if it is to be rebuilt. Grid-stride over slots.
+/// Frees the selected slots. Grid-stride over slots.
 kernel void cache_evict(const FrameParams frame_params, global const PassCounts *counts,
                         uint num_slots, global uint *slot_block_ids, global const uint *slot_stamps,
-                        global const uchar *slot_ranks, global BlockEntry *table,
+                        global const uchar *slot_ranks, global uint *table,
                         global CacheState *cache, global uint *free_slots) {
   const FrameParams *frame = &frame_params;
-  const uint cutoff_rank = cache->cutoff_rank, rebuild = cache->rebuild;
+  const uint cutoff_rank = cache->cutoff_rank;
   if (counts->requested_count == 0) return;
-  for (uint i = get_global_id(0); rebuild && i < 8 * frame->schedule.table_groups;
-       i += get_global_size(0)) {
-    table[i].block_id = ISO_INVALID_ID;
-    table[i].slot = ISO_BLOCK_ABSENT;
-  }
   for (uint slot = get_global_id(0); cutoff_rank < ISO_EVICTION_RANKS && slot < num_slots;
        slot += get_global_size(0)) {
     const uint stamp = slot_stamps[slot], block_id = slot_block_ids[slot];
@@ -298,23 +264,9 @@ kernel void cache_evict(const FrameParams frame_params, global const PassCounts 
     if (is_victim && rank == cutoff_rank)
       is_victim = atomic_inc(&cache->num_cutoff) < cache->cutoff_count;
     if (is_victim) {
-      if (!rebuild) table_evict(frame, table, block_id);
+      remove_block(frame, table, block_coords(frame, block_id));
       slot_block_ids[slot] = ISO_INVALID_ID;
       free_slots[cache->free_before + atomic_inc(&cache->num_evicted)] = slot;
-    }
-  }
-}
-
-/// Enters the blocks that are still cached into the emptied table. Grid-stride over slots.
-kernel void cache_rebuild(const FrameParams frame_params, global const PassCounts *counts,
-                          uint num_slots, global const uint *slot_block_ids,
-                          global const ulong *slot_changing, global const CacheState *cache,
-                          global BlockEntry *table) {
-  const FrameParams *frame = &frame_params;
-  if (counts->requested_count == 0 || !cache->rebuild) return;
-  for (uint slot = get_global_id(0); slot < num_slots; slot += get_global_size(0)) {
-    if (slot_block_ids[slot] != ISO_INVALID_ID) {
-      table_insert(frame, table, slot_block_ids[slot], slot, slot_changing[slot]);
     }
   }
 }
@@ -329,11 +281,11 @@ kernel void cache_rebuild(const FrameParams frame_params, global const PassCount
 ///
 /// slot_type    ISO_SLOTS_*
 /// cache_words  slots of ISO_BLOCK_VOXELS values
-/// Launch       grid-stride over slots and table
+/// Launch       grid-stride over slots
 kernel void cache_classify(const FrameParams frame_params, uint num_slots, uint slot_type,
                            global const uint *slot_block_ids,
                            global const ISO_WORDS(SlotValue) *cache_words, global ulong *inside,
-                           global BlockEntry *table) {
+                           global ulong *changing) {
   const FrameParams *frame = &frame_params;
   const float isovalue = frame->surface.isovalue;
   const uint value_bytes = slot_type == ISO_SLOTS_FLOAT32                                  ? 4
@@ -367,10 +319,8 @@ kernel void cache_classify(const FrameParams frame_params, uint num_slots, uint 
           }
       }
       inside[slot] = bits;
+      changing[slot] = ISO_CHANGING_UNKNOWN;
     }
-  }
-  for (uint i = get_global_id(0); i < 8 * frame->schedule.table_groups; i += get_global_size(0)) {
-    table[i].changing_low = table[i].changing_high = (uint)ISO_CHANGING_UNKNOWN;
   }
 }
 
@@ -383,10 +333,10 @@ kernel void cache_classify(const FrameParams frame_params, uint num_slots, uint 
 /// Launch  grid-stride over requests
 kernel void cache_assign(const FrameParams frame_params, global const PassCounts *asked,
                          global PassCounts *counts, global const uint *request_block_ids,
-                         uint capacity, global const uint *free_slots, global BlockEntry *table,
-                         global uint *slot_block_ids, global uint *slot_stamps,
-                         global uint *requested_bits, global uint *decode_slots,
-                         global CacheState *cache) {
+                         uint capacity, global const uint *free_slots, global uint *table,
+                         global ulong *changing, global uint *slot_block_ids,
+                         global uint *slot_stamps, global uint *requested_bits,
+                         global uint *decode_slots, global CacheState *cache) {
   const FrameParams *frame = &frame_params;
   const uint listed = listed_count(asked, capacity), num_free = cache->free_count;
   const uint granted = min(listed, num_free);
@@ -402,7 +352,8 @@ kernel void cache_assign(const FrameParams frame_params, global const PassCounts
     requested_bits[request_word(frame, b.x, b.y, b.z)] = 0; /* every mark in it is of this pass */
     if (i < granted) {
       const uint slot = free_slots[num_free - 1 - i];
-      table_insert(frame, table, block_id, slot, ISO_CHANGING_UNKNOWN);
+      table[enter_block(frame, table, b, slot)] = slot;
+      changing[slot] = ISO_CHANGING_UNKNOWN;
       slot_block_ids[slot] = block_id;
       slot_stamps[slot] = needed_stamp(asked->pass);
       decode_slots[i] = slot;
@@ -418,7 +369,7 @@ kernel void cache_assign(const FrameParams frame_params, global const PassCounts
 /// Launch         grid-stride over slots
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_touched(
     const FrameParams frame_params, global const PassCounts *counts, uint num_slots,
-    uint in_dual_grids, global const BlockEntry *table, global const uint *slot_block_ids,
+    uint in_dual_grids, global const uint *table, global const uint *slot_block_ids,
     global const uint *slot_stamps, global uint *touched) {
   const FrameParams *frame = &frame_params;
   local uint group_touched;
@@ -437,22 +388,27 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_to
   if (get_local_id(0) == 0 && group_touched != 0) atomic_add(touched, group_touched);
 }
 
-/// The cache as it was made: every slot free. Grid-stride over slots and table.
-kernel void cache_clear(uint num_slots, uint table_size, global BlockEntry *table,
+/// The cache as it was made: every slot free.
+///
+/// blocks_x, blocks_y  of the grid in which ids of blocks count
+/// Launch              grid-stride over slots
+kernel void cache_clear(uint num_slots, uint blocks_x, uint blocks_y, global uint *table,
                         global uint *slot_block_ids, global uint *slot_stamps,
                         global uint *free_slots, global CacheState *cache) {
   if (get_global_id(0) == 0) {
     cache->free_count = num_slots;
     cache->granted = cache->recycled = 0;
-    cache->table_count = 0;
   }
   for (uint slot = get_global_id(0); slot < num_slots; slot += get_global_size(0)) {
+    const uint block_id = slot_block_ids[slot], x = block_id % blocks_x,
+               y = block_id / blocks_x % blocks_y, layer = block_id / blocks_x / blocks_y;
+    if (block_id != ISO_INVALID_ID)
+      table[directory_begin(num_slots) + group_of_block(blocks_x, blocks_y, x, y, layer)] =
+          empty_page(num_slots);
+    for (uint i = 0; i < 8; ++i) table[8 * slot + i] = ISO_BLOCK_ABSENT; /* page number `slot` */
+    table[page_count_at(num_slots, slot)] = 0;
     slot_block_ids[slot] = ISO_INVALID_ID;
     slot_stamps[slot] = 0; /* older than every pass */
     free_slots[slot] = slot;
-  }
-  for (uint i = get_global_id(0); i < table_size; i += get_global_size(0)) {
-    table[i].block_id = ISO_INVALID_ID;
-    table[i].slot = ISO_BLOCK_ABSENT;
   }
 }

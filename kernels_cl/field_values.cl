@@ -44,12 +44,11 @@ ISO_LONG float cached_value(global const FieldMap *map, global const uint *label
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void field_values(
     const FrameParams frame_params, global const FrameParams *frames, uint num_frames,
     global const FieldMap *map, global const uint *label_table, uint parts, uint begins,
-    global const BlockEntry *table, global const SlotValue *cache_values,
-    global const PassCounts *prev, global PassCounts *counts, global PassCounts *next_counts,
-    global const uint *active_ray_ids, global uint *next_active_ray_ids,
-    global const HitRecord *hits, global float *field_values, global uint *slot_stamps,
-    global uint *requested_bits, global uint *request_block_ids, uint capacity,
-    global CacheState *cache) {
+    global const uint *table, global const SlotValue *cache_values, global const PassCounts *prev,
+    global PassCounts *counts, global PassCounts *next_counts, global const uint *active_ray_ids,
+    global uint *next_active_ray_ids, global const HitRecord *hits, global float *field_values,
+    global uint *slot_stamps, global uint *requested_bits, global uint *request_block_ids,
+    uint capacity, global CacheState *cache) {
   const FrameParams *frame = &frame_params;
   ISO_SCRATCH_ARRAY(slots, 8);
   local uint staged[ISO_REQUEST_STAGING];

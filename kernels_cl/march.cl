@@ -136,9 +136,9 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
     const FrameParams frame_params, global const FrameParams *frames, uint num_frames,
     global const ClipParams *clip, uint parts, global const GivenRay *given,
     global const uint *macrocell_masks, global const ushort *ranges, global const uint *no_data,
-    uint no_data_begin, global BlockEntry *table, global const ulong *inside,
-    global const SlotValue *cache_values, global const PassCounts *prev, global PassCounts *counts,
-    global PassCounts *next_counts, global const uint *active_ray_ids,
+    uint no_data_begin, global const uint *table, global const ulong *inside,
+    global ulong *changing, global const SlotValue *cache_values, global const PassCounts *prev,
+    global PassCounts *counts, global PassCounts *next_counts, global const uint *active_ray_ids,
     global uint *next_active_ray_ids, global uint *ray_block_ids, global HitRecord *hits,
     global uint *slot_stamps, global CacheState *cache) {
   const FrameParams *frame = &frame_params;
@@ -151,6 +151,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void march(
   const CacheReader reader = {
       .table = table,
       .inside = inside,
+      .changing = changing,
       .values = cache_values,
       .slot_stamps = slot_stamps,
       .stamp = read_stamp(counts->pass),

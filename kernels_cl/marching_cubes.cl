@@ -18,7 +18,7 @@
 /// Out             edges, num_vertices, num_triangles [list]
 /// Launch          grid-stride over entries
 kernel void marching_cubes_count(const FrameParams frame_params, uint begin, uint end,
-                                 global const uint *block_ids, global const BlockEntry *table,
+                                 global const uint *block_ids, global const uint *table,
                                  global const ulong *inside, global const uchar *cell_triangles,
                                  global const uint *index, uint no_data_begin,
                                  global BlockEdges *edges, global uint *num_vertices,
@@ -135,7 +135,7 @@ ISO_INLINE uint vertex_number(const ListedBlocks *blocks, uint voxel, uint edge)
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void marching_cubes_write(
     const FrameParams frame_params, uint begin, uint end, uint with_gradients,
     global const uint *block_ids, global const uint *listed_masks,
-    global const uint *listed_offsets, global const BlockEntry *table,
+    global const uint *listed_offsets, global const uint *table,
     global const SlotValue *cache_values, global const ulong *inside,
     global const uchar *cell_triangles, global const uint *index, uint no_data_begin,
     global const BlockEdges *edges, global const uint *vertex_offsets,

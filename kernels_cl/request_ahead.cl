@@ -9,17 +9,17 @@
 
 /// Asks for those of the given corners of the dual grid of block b that are not cached; stamps the
 /// others. In steps for all corners, so that a GPU waits for memory twice, not sixteen times.
-ISO_INLINE void request_touched(const FrameParams *frame, global const BlockEntry *table,
+ISO_INLINE void request_touched(const FrameParams *frame, global const uint *table,
                                 global uint *slot_stamps, uint stamp, BlockCoords b, uint touched,
                                 Requests requests) {
-  BlockEntry entries[8];
+  uint slots[8];
   uint missing = unasked_corners(frame, b, touched, requests);
   if (missing == 0) return;
-  find_dual_grid(frame, table, b.x, b.y, b.z, entries);
+  find_dual_grid(frame, table, b.x, b.y, b.z, slots);
   ISO_UNROLL
   for (uint corner = 0; corner < 8; ++corner) {
-    if ((missing >> corner & 1u) != 0 && entries[corner].slot != ISO_BLOCK_ABSENT) {
-      slot_stamps[entries[corner].slot] = stamp;
+    if ((missing >> corner & 1u) != 0 && slots[corner] != ISO_BLOCK_ABSENT) {
+      slot_stamps[slots[corner]] = stamp;
       missing &= ~(1u << corner);
     }
   }
@@ -51,7 +51,7 @@ ISO_INLINE uint existing_corners(const FrameParams *frame, BlockCoords b) {
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void request_ahead(
     const FrameParams frame_params, global const FrameParams *frames, uint num_frames,
     global const ClipParams *clip, global const GivenRay *given, global const uint *macrocell_masks,
-    global const BlockEntry *table, global PassCounts *counts, global const uint *active_ray_ids,
+    global const uint *table, global PassCounts *counts, global const uint *active_ray_ids,
     global const uint *ray_block_ids, global uint *slot_stamps, global uint *requested_bits,
     global uint *request_block_ids, uint capacity, global CacheState *cache) {
   const FrameParams *frame = &frame_params;

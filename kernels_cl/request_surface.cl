@@ -25,7 +25,7 @@ ISO_INLINE int needed_neighbour(const FrameParams *frame, BlockCoords b, uint ne
 /// Launch  grid-stride over entries
 kernel void request_surface(const FrameParams frame_params, uint begin, uint end,
                             uint with_gradients, global const uint *block_ids,
-                            global PassCounts *counts, global const BlockEntry *table,
+                            global PassCounts *counts, global const uint *table,
                             global uint *slot_stamps, global uint *requested_bits,
                             global uint *request_block_ids, uint capacity,
                             global CacheState *cache) {

@@ -78,7 +78,7 @@ ISO_LONG void write_gradient(global HitRecord *hit, const CachedStencil *cached,
 ///         in parts as start_rays
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void smooth_normals(
     const FrameParams frame_params, global const FrameParams *frames, uint num_frames, uint parts,
-    uint begins, global const BlockEntry *table, global const SlotValue *cache_values,
+    uint begins, global const uint *table, global const SlotValue *cache_values,
     global const PassCounts *prev, global PassCounts *counts, global PassCounts *next_counts,
     global const uint *active_ray_ids, global uint *next_active_ray_ids, global HitRecord *hits,
     global uint *slot_stamps, global uint *requested_bits, global uint *request_block_ids,

@@ -155,7 +155,9 @@ class CacheModel {
       slots_[targets[i]] = stream[i];
       used_[targets[i]] = now_;
     }
-    /* Page table and slots are inverse of each other. */
+    /* Table and slots are inverse of each other. */
+    test::expect_pages_of_cached_blocks(world.frame, world.cache.table.read());
+    if (testing::Test::HasFatalFailure()) return;
     std::size_t num_cached = 0;
     for (uint block = 0; block < table.size(); ++block) {
       if (table[block] == ISO_BLOCK_ABSENT) continue;

@@ -13,6 +13,7 @@
 #include "core/stages/request_ahead.hpp"
 #include "core/stages/start_rays.hpp"
 #include "kernels_cl/portable/ray_state.h"
+#include "tests/cache_table.hpp"
 #include "tests/frame_scene.hpp"
 #include "tests/ray_cases.hpp"
 
@@ -98,11 +99,7 @@ struct RaysWorld {
 
   /// [blocks] slot of each block, ISO_BLOCK_ABSENT if it is not cached.
   std::vector<uint> slots_by_block() const {
-    std::vector<uint> slots(block_count(frame.grid), ISO_BLOCK_ABSENT);
-    for (const BlockEntry &entry : cache.table.read()) {
-      if (entry.block_id != ISO_INVALID_ID) slots.at(entry.block_id) = entry.slot;
-    }
-    return slots;
+    return test::slots_by_block(frame, cache.table.read());
   }
 
   const test::TestVolume &volume;

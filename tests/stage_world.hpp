@@ -12,6 +12,7 @@
 #include "core/stages/wavefront.hpp"
 #include "core/view/frame.hpp"
 #include "kernels_cl/portable/block_grid.h"
+#include "tests/cache_table.hpp"
 #include "tests/slot_values.hpp"
 #include "tests/stage_support.hpp"
 
@@ -52,7 +53,7 @@ struct StageWorld {
   /// Another camera or isovalue; image size and volume stay.
   void set_frame(const FrameParams &frame_params) {
     frame = frame_params;
-    frame.schedule.table_groups = cache.table_groups;
+    frame.schedule.cache_slots = cache.num_slots;
     rays.frame = frame;
   }
 
@@ -93,13 +94,7 @@ struct StageWorld {
 
   /// [blocks] slot of each block, ISO_BLOCK_ABSENT if it is not cached.
   std::vector<uint> slots_by_block() const {
-    std::vector<uint> slots(
-        std::size_t{frame.grid.blocks_x} * frame.grid.blocks_y * frame.grid.blocks_z,
-        ISO_BLOCK_ABSENT);
-    for (const BlockEntry &entry : cache.table.read()) {
-      if (entry.block_id != ISO_INVALID_ID) slots.at(entry.block_id) = entry.slot;
-    }
-    return slots;
+    return test::slots_by_block(frame, cache.table.read());
   }
 
   /// Instead of decoding: puts the voxels [nz][ny][nx] of the blocks just granted into their slots,

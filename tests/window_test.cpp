@@ -12,7 +12,7 @@ FrameParams frame_of(uint width, uint height) {
   frame.view.width = width;
   frame.view.height = height;
   frame.schedule.max_spec_count = 64;
-  frame.schedule.table_groups = 50;
+  frame.schedule.cache_slots = 200;
   return frame;
 }
 

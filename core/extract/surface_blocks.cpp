@@ -23,7 +23,7 @@ OnHost window_for(const CompressedVolume &volume) {
 
 /// All slots may be requested in one pass, whatever number of rays.
 BlockCache::Limits cache_limits(const BlockGrid &grid, std::uint32_t num_slots, SlotType type) {
-  return BlockCache::limits_for(grid, num_slots, ISO_MAX_CACHE_SLOTS, 2, type);
+  return BlockCache::limits_for(grid, num_slots, ISO_MAX_CACHE_SLOTS, type);
 }
 
 Wavefront::Limits ray_limits(const SurfaceBlocks::Options &options) {

@@ -22,7 +22,7 @@ class BlockTriangles {
 
   /// Counts the triangles of blocks.
   ///
-  /// frame      its grid, and schedule.table_groups of the cache
+  /// frame      its grid, and schedule.cache_slots
   /// cache      has the dual grids of these blocks, with `inside` of the isovalue at hand
   /// block_ids  [listed] of ActiveBlocks
   /// no_data    of the volume, for a device that draws it

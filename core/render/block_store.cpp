@@ -104,7 +104,7 @@ BlockStore::BlockStore(ocl::Device &of, const CompressedVolume &volume,
       cache(of, plan.limits.cache, options.group_size, levels.size() > 1) {
   schedule_ = {.max_spec_count = options.max_speculation,
                .per_ray_speculation = options.per_ray_speculation,
-               .table_groups = cache.table_groups,
+               .cache_slots = cache.num_slots,
                .scanned_pairs = 0};
   wanted_slots_ = plan.cache_slots;
   is_small_ = plan.cache_slots < kSmallCache && !plan.can_grow() &&
@@ -129,7 +129,7 @@ void BlockStore::open(Wavefront &rays, std::vector<FrameParams> frames,
     Level &level = levels[i];
     FrameParams &frame = frames[i];
     frame.schedule = schedule_;
-    frame.schedule.table_groups = cache.table_groups;
+    frame.schedule.cache_slots = cache.num_slots;
     // A ray may begin outside the box: at a border between bands, or at a cap.
     if (draws(frame))
       select(level, frame, !has_bands && source == RaySource::kCamera && !rays.is_clipped());

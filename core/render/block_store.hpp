@@ -164,7 +164,7 @@ class BlockStore {
   std::uint32_t wanted_slots_ = 0;   ///< slots from the next frame on
   bool is_small_ = false;            ///< slots may run out within one pass
   bool slots_are_scarce_ = true;     ///< free slots may not suffice for the next passes
-  Schedule schedule_{};              ///< every frame's, except table_groups
+  Schedule schedule_{};              ///< every frame's, except cache_slots
   ScreenBox whole_screen_{};         ///< of the frame at work: of all rays that meet the volume
   std::optional<LevelRange> asked_;  ///< levels whose blocks the last pass may have asked for
   /// Isovalue and group of the cache's bits of voxels inside.

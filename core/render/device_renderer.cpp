@@ -253,7 +253,7 @@ void DeviceRenderer::compile_kernels() {
   Wavefront &rays = rays_;
   rays.frame = {};
   rays.frame.view.width = rays.frame.view.height = rays.frame.schedule.max_spec_count = 1;
-  rays.frame.schedule.table_groups = blocks_.cache.table_groups;
+  rays.frame.schedule.cache_slots = blocks_.cache.num_slots;
   // Frames of one level of detail and of several have their own kernels.
   for (std::uint32_t num_levels = 1; num_levels <= std::min<std::size_t>(2, blocks_.levels.size());
        ++num_levels) {

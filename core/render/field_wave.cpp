@@ -65,7 +65,7 @@ void FieldWave::enqueue_pass() {
   frame.grid = grid_.grid;
   frame.place = grid_.place;
   frame.brick = grid_.brick;
-  frame.schedule.table_groups = blocks_.cache.table_groups;
+  frame.schedule.cache_slots = blocks_.cache.num_slots;
   if (own_) {
     frame.surface = grid_.surface;
     own_->levels[0].frame = frame;

@@ -103,7 +103,7 @@ RendererLimits limits_of(const CompressedVolume &volume, const MemoryRequest &re
                                                            : 1,
                .with_field = request.with_field || request.max_surfaces != 0},
       .cache = BlockCache::limits_for(
-          make_id_grid(grids), cache_slots, rays, request.sparse_table ? 4 : 2,
+          make_id_grid(grids), cache_slots, rays,
           request.with_labels
               ? SlotType::kGroups
               : slot_type_for(levels_of(volume, request.with_levels), request.with_bounds)),
@@ -180,7 +180,7 @@ FieldPlan plan_field(const CompressedVolume &field, const MemoryRequest &request
   const BlockGrid grid = make_grid(field.info);
   const auto plan_of = [&](std::uint32_t slots, StreamPlace place) {
     FieldPlan plan{.num_labels = ISO_NUM_LABELS};
-    plan.cache = BlockCache::limits_for(grid, slots, request.num_rays, 2, slot_type_for(field));
+    plan.cache = BlockCache::limits_for(grid, slots, request.num_rays, slot_type_for(field));
     plan.stream = place;
     plan.largest_stream_part = request.largest_stream_part;
     MemoryPlan stream;

@@ -42,7 +42,6 @@ struct MemoryRequest {
   std::uint64_t kept_rays = 0;      ///< rays of KeptPicture
   bool with_given_rays = false;     ///< rays of any origin, and ambient rays
   std::uint32_t max_surfaces = 0;   ///< of frames with layers
-  bool sparse_table = false;        ///< the cache's table has room, so that rays look up faster
   bool with_field = false;          ///< hits have values of a field
   bool with_labels = false;         ///< voxels are labels
   bool with_bounce = false;         ///< ambient rays may bring light

@@ -125,7 +125,6 @@ MemoryPlan make_plan(const ocl::Device &device, const CompressedVolume &volume,
                               options.with_kept_picture ? halved(options.size, 1).num_rays() : 0,
                               options.with_given_rays,
                               options.max_surfaces,
-                              options.memory_budget == 0 && options.cache_slots == 0,
                               options.field != nullptr,
                               options.with_labels,
                               options.with_bounce};

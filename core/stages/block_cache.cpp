@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "core/base/error.hpp"
-#include "kernels_cl/portable/block_grid.h"
 
 namespace isowave::core {
 
@@ -20,13 +19,12 @@ std::uint32_t checked_slots(std::uint32_t num_slots) {
   return num_slots;
 }
 
-/// Entries / 8 of the table: with twice as many entries as slots, an eighth of them has evicted
-/// blocks' keys at most before the table is rebuilt (H100, 512^3, 65,536 slots: frames take 1.26
-/// ms; with a quarter, 1.45). Not a multiple of 3, so that ISO_TABLE_STEP reaches every entry.
-std::uint32_t table_groups_for(const BlockCache::Limits &limits) {
-  const std::uint32_t groups = limits.num_slots / 8 * limits.slot_entries +
-                               limits.num_slots % 8 * limits.slot_entries / 8 + 1;
-  return groups % 3 == 0 ? groups + 1 : groups;
+/// Words of the table. The directory has room for neighbours of the last groups, beyond the volume.
+std::uint64_t table_words(const BlockCache::Limits &limits) {
+  const std::uint64_t groups_x = (limits.blocks_x + 1) / 2, groups_y = (limits.blocks_y + 1) / 2,
+                      layers = limits.num_blocks / limits.blocks_x / limits.blocks_y,
+                      groups = groups_x * groups_y * ((layers + 1) / 2 + 1) + groups_x + 1;
+  return 9 * std::uint64_t{limits.num_slots} + 8 + groups;
 }
 
 }  // namespace
@@ -38,7 +36,7 @@ std::uint32_t BlockCache::Limits::max_requests() const {
 
 ocl::BufferSizes BlockCache::sizes(const Limits &limits) {
   const std::uint64_t slots = limits.num_slots, requests = limits.max_requests();
-  return {ocl::buffer_size<BlockEntry>("block table", 8 * std::uint64_t{table_groups_for(limits)}),
+  return {ocl::buffer_size<uint>("block table", table_words(limits)),
           ocl::buffer_size<SlotValue>("block cache", slot_bytes(limits.slot_type) * slots),
           ocl::buffer_size<ulong>("voxels inside", slots),
           ocl::buffer_size<uint>("cache slot blocks", slots),
@@ -63,11 +61,11 @@ BlockCache::BlockCache(ocl::Device &device, const Limits &limits, const ocl::Buf
                        std::uint32_t group_size, const ocl::Defines &defines)
     : slot_type(limits.slot_type),
       num_slots(checked_slots(limits.num_slots)),
-      table_groups(table_groups_for(limits)),
       capacity(limits.max_requests()),
       table(device, sizes["block table"]),
       values(device, sizes["block cache"]),
       inside(device, sizes["voxels inside"]),
+      changing(device, sizes["cells of cached blocks"]),
       slot_block_ids(device, sizes["cache slot blocks"]),
       slot_stamps(device, sizes["cache slot stamps"]),
       free_slots(device, sizes["free slots"]),
@@ -76,55 +74,63 @@ BlockCache::BlockCache(ocl::Device &device, const Limits &limits, const ocl::Buf
       decode_slots(device, sizes["decode slots"]),
       state(device, sizes["cache state"]),
       group_size_(group_size),
+      blocks_x_(limits.blocks_x),
+      blocks_y_(limits.blocks_y),
       pairs_range_(ocl::Range::strided(limits.num_rays, group_size, device)),
       slots_range_(ocl::Range::strided(num_slots, group_size, device)),
       requests_range_(ocl::Range::strided(capacity, group_size, device)),
       slot_ranks_(device, sizes["slot ranks"]),
-      slot_changing_(device, sizes["cells of cached blocks"]),
       rank_histogram_(device, sizes["eviction ranks"]),
       touched_(device, sizes["touched blocks"]),
       request_(device, defines),
       rank_(device, defines),
       select_(device, defines),
       evict_(device, defines),
-      rebuild_(device, defines),
       classify_(device, defines),
       assign_(device, defines),
       count_touched_(device, defines),
       clear_(device, defines) {
+  make_empty();
+}
+
+void BlockCache::make_empty() {
+  const std::size_t empty = std::size_t{8} * empty_page(num_slots),
+                    directory = directory_begin(num_slots);
+  table.fill(ISO_BLOCK_ABSENT, empty, 8);
+  table.fill(empty_page(num_slots), directory, table.size() - directory);
+  slot_block_ids.fill(ISO_INVALID_ID);
   clear();
 }
 
 void BlockCache::clear() {
-  clear_(slots_range_, num_slots, 8 * table_groups, table, slot_block_ids, slot_stamps, free_slots,
-         state);
+  clear_(slots_range_, num_slots, blocks_x_, blocks_y_, table, slot_block_ids, slot_stamps,
+         free_slots, state);
 }
 
 void BlockCache::resize(const Limits &limits) {
   checked_slots(limits.num_slots);
   const ocl::BufferSizes made = sizes(limits);
   const auto of_slots = [&](auto &&visit) {
-    visit(table), visit(values), visit(inside), visit(slot_block_ids), visit(slot_stamps),
-        visit(free_slots), visit(request_block_ids), visit(decode_slots), visit(slot_ranks_),
-        visit(slot_changing_);
+    visit(table), visit(values), visit(inside), visit(changing), visit(slot_block_ids),
+        visit(slot_stamps), visit(free_slots), visit(request_block_ids), visit(decode_slots),
+        visit(slot_ranks_);
   };
   ocl::Device &device = state.device();
   device.finish();  // kernels may still use what goes
   of_slots([](auto &buffer) { const auto gone = std::move(buffer); });
   of_slots([&](auto &buffer) { buffer = {device, made[buffer.name()]}; });
   num_slots = limits.num_slots;
-  table_groups = table_groups_for(limits);
   capacity = limits.max_requests();
   slots_range_ = ocl::Range::strided(num_slots, group_size_, device);
   requests_range_ = ocl::Range::strided(capacity, group_size_, device);
   requested_bits.fill(0);
-  clear();
+  make_empty();
   device.finish();
 }
 
 void BlockCache::classify(Wavefront &rays) {
   classify_(slots_range_, rays.frame, num_slots, static_cast<uint>(slot_type), slot_block_ids,
-            values, inside, table);
+            values, inside, changing);
 }
 
 void BlockCache::count_touched(Wavefront &rays, bool in_dual_grids) {
@@ -140,18 +146,16 @@ void BlockCache::request(Wavefront &rays) {
 
 void BlockCache::evict(const CountsBuffer &asked, Wavefront &rays) {
   rank_(slots_range_, rays.frame, asked, num_slots, capacity, state, table, slot_block_ids,
-        slot_stamps, slot_ranks_, slot_changing_, rank_histogram_);
+        slot_stamps, slot_ranks_, rank_histogram_);
   select_(ocl::Range::groups(1, group_size_), rays.frame, asked, num_slots, table, slot_stamps,
           requested_bits, request_block_ids, capacity, rank_histogram_, state);
   evict_(slots_range_, rays.frame, asked, num_slots, slot_block_ids, slot_stamps, slot_ranks_,
          table, state, free_slots);
-  rebuild_(slots_range_, rays.frame, asked, num_slots, slot_block_ids, slot_changing_, state,
-           table);
 }
 
 void BlockCache::assign(const CountsBuffer &asked, Wavefront &rays) {
   assign_(requests_range_, rays.frame, asked, rays.counts, request_block_ids, capacity, free_slots,
-          table, slot_block_ids, slot_stamps, requested_bits, decode_slots, state);
+          table, changing, slot_block_ids, slot_stamps, requested_bits, decode_slots, state);
 }
 
 }  // namespace isowave::core

@@ -20,7 +20,7 @@ struct BlockCache {
     std::uint64_t num_rays = 0;                ///< bounds a pass's pairs
     std::uint64_t num_blocks = 0;              ///< of all levels of detail, by their ids
     std::uint64_t num_macrocells = 0;          ///< of these blocks
-    std::uint32_t slot_entries = 2;            ///< of the table, for each slot; a multiple of 2
+    std::uint32_t blocks_x = 0, blocks_y = 0;  ///< of the grid in which their ids count
     SlotType slot_type = SlotType::kFloat32;
 
     /// The most requests that are listed: no more than can be granted. A ray's block requests at
@@ -29,10 +29,9 @@ struct BlockCache {
   };
   /// Limits for the blocks of `grid`: of make_id_grid() if there are several levels of detail.
   static Limits limits_for(const BlockGrid &grid, std::uint32_t num_slots, std::uint64_t num_rays,
-                           std::uint32_t slot_entries = 2,
                            SlotType slot_type = SlotType::kFloat32) {
-    return {num_slots,    num_rays, block_count(grid), core::num_macrocells(grid),
-            slot_entries, slot_type};
+    return {num_slots,     num_rays,      block_count(grid), core::num_macrocells(grid),
+            grid.blocks_x, grid.blocks_y, slot_type};
   }
   static ocl::BufferSizes sizes(const Limits &limits);
 
@@ -72,7 +71,7 @@ struct BlockCache {
   /// Waits  yes
   std::uint32_t touched_blocks() const { return touched_.read().front(); }
 
-  /// Brings `inside` and the table up to date with another isovalue of rays.frame. Does not wait.
+  /// Brings `inside` and `changing` up to date with another isovalue of rays.frame. Does not wait.
   void classify(Wavefront &rays);
 
   /// Forgets every block: the next pass finds the cache as it was made. Does not wait.
@@ -88,12 +87,13 @@ struct BlockCache {
 
   SlotType slot_type;
   std::uint32_t num_slots;
-  std::uint32_t table_groups;     ///< Schedule::table_groups
-  std::uint32_t capacity;         ///< of the request list: requests beyond it are dropped
-  ocl::Buffer<BlockEntry> table;  ///< [8 * table_groups] see kernels_cl/portable/block_table.h
+  std::uint32_t capacity;   ///< of the request list: requests beyond it are dropped
+  ocl::Buffer<uint> table;  ///< block -> slot: kernels_cl/portable/block_table.h
   /// [num_slots * 64] decoded values, of slot_type, x + 4y + 16z within a slot
   ocl::Buffer<SlotValue> values;
   ocl::Buffer<ulong> inside;         ///< [num_slots] bit x + 4y + 16z: is value >= isovalue?
+  ocl::Buffer<ulong> changing;       ///< [num_slots] ... does inside change in the cell?
+                                     ///< ISO_CHANGING_UNKNOWN: no ray has looked
   ocl::Buffer<uint> slot_block_ids;  ///< [num_slots] block in each slot or ISO_INVALID_ID
   ocl::Buffer<uint>
       slot_stamps;  ///< [num_slots] when it was used last: kernels_cl/device/slot_stamps.h
@@ -105,21 +105,21 @@ struct BlockCache {
   ocl::Buffer<CacheState> state;        ///< [1]
 
  private:
+  /// Clears buffers that were just made.
+  void make_empty();
+
   BlockCache(ocl::Device &device, const Limits &limits, const ocl::BufferSizes &sizes,
              std::uint32_t group_size, const ocl::Defines &defines);
 
-  std::uint32_t group_size_;
+  std::uint32_t group_size_, blocks_x_, blocks_y_;
   ocl::Range pairs_range_, slots_range_, requests_range_;
   ocl::Buffer<uchar> slot_ranks_;  ///< [num_slots] orders of eviction
-  ocl::Buffer<ulong>
-      slot_changing_;  ///< [num_slots] BlockEntry::changing while the table is rebuilt
   ocl::Buffer<uint> rank_histogram_;
   ocl::Buffer<uint> touched_;  ///< [1]
   ocl::Kernel<kernels::cache_request> request_;
   ocl::Kernel<kernels::cache_rank> rank_;
   ocl::Kernel<kernels::cache_select> select_;
   ocl::Kernel<kernels::cache_evict> evict_;
-  ocl::Kernel<kernels::cache_rebuild> rebuild_;
   ocl::Kernel<kernels::cache_classify> classify_;
   ocl::Kernel<kernels::cache_assign> assign_;
   ocl::Kernel<kernels::cache_touched> count_touched_;

@@ -24,8 +24,8 @@ void March::operator()(const Macrocells &macrocells, BlockCache &cache, Wavefron
   kernel_.of(rays)(range_, rays.frame, rays.level_frames, rays.num_level_frames, rays.clip,
                    range_.parts, rays.given, macrocells.masks(), macrocells.ranges(),
                    macrocells.no_data().words_or(macrocells.masks()), macrocells.no_data().begin,
-                   cache.table, cache.inside, cache.values, rays.previous_counts, rays.counts,
-                   rays.next_counts, rays.active_ray_ids, rays.next_active_ray_ids,
+                   cache.table, cache.inside, cache.changing, cache.values, rays.previous_counts,
+                   rays.counts, rays.next_counts, rays.active_ray_ids, rays.next_active_ray_ids,
                    rays.ray_block_ids, rays.hits_of(source_), cache.slot_stamps, cache.state);
 }
 

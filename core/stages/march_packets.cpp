@@ -69,7 +69,7 @@ void MarchPackets::march(ocl::Kernel<kernels::march_packets> &kernel, const Fram
   kernel(range_, frame, rays.clip, begin.of, begin.bands_behind, part(0), part(1), part(2), part(3),
          on_demand_ ? stream.index() : none, stream.layout, macrocells.masks(), macrocells.ranges(),
          macrocells.no_data().words_or(none), macrocells.no_data().begin, cache.table, cache.inside,
-         cache.values, rays.previous_counts, rays.counts, rays.active_ray_ids,
+         cache.changing, cache.values, rays.previous_counts, rays.counts, rays.active_ray_ids,
          rays.next_active_ray_ids, rays.ray_block_ids, rays.hits, cache.slot_block_ids,
          cache.slot_stamps, cache.requested_bits, cache.free_slots, cache.state);
 }

@@ -48,7 +48,7 @@ class MarchingCubes {
 
   /// Counts the vertices and triangles of entries [begin, end) of the list.
   ///
-  /// frame    its grid, and schedule.table_groups of the cache
+  /// frame    its grid, and schedule.cache_slots
   /// cache    has the dual grids of these blocks, with `inside` of the isovalue at hand
   /// no_data  of the volume, for a device that draws it
   /// Out      surface.edges, .vertex_offsets, .triangle_offsets [begin, end): counts

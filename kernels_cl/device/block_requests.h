@@ -8,25 +8,7 @@
 /// Begins a pass. One work-item, in a kernel that reads none of this.
 ISO_INLINE void open_requests(global CacheState *cache) {
   cache->free_count -= cache->granted;
-  cache->table_count += cache->granted;
   cache->granted = cache->recycled = 0;
-}
-
-/// Are so many keys too many, those of evicted blocks included? Three eighths of the entries stay
-/// without.
-ISO_INLINE int table_is_full(const FrameParams *frame, uint num_keys) {
-  return num_keys > 5 * frame->schedule.table_groups;
-}
-
-/// Adds the key of block b to the table, or finds the one it has. Returns its entry.
-ISO_INLINE uint table_key(const FrameParams *frame, global BlockEntry *table, BlockCoords b,
-                          uint block_id) {
-  uint i = table_home(frame, b.x, b.y, b.z);
-  for (;;) {
-    const uint key = atomic_cmpxchg(&table[i].block_id, ISO_INVALID_ID, block_id);
-    if (key == ISO_INVALID_ID || key == block_id) return i;
-    i = table_next(frame, i);
-  }
 }
 
 /// Word and bit of a block in requested_bits [2 * coarse macrocells]; laid out as macrocell_masks,
@@ -54,7 +36,7 @@ ISO_INLINE void unmark_request(const FrameParams *frame, volatile global uint *r
 
 /// Stamps block (x,y,z) as needed if it is cached. Returns 1 if it is not, and this is the first to
 /// ask for it.
-ISO_INLINE int request_block(const FrameParams *frame, global const BlockEntry *table,
+ISO_INLINE int request_block(const FrameParams *frame, global const uint *table,
                              global uint *slot_stamps, uint pass,
                              volatile global uint *requested_bits, uint x, uint y, uint z) {
   const uint slot = cached_slot(frame, table, x, y, z);

@@ -8,7 +8,7 @@
 
 /// The corners of dual cell (x,y,z) from the cache, minus the isovalue; corner x + 2y + 4z. All its
 /// blocks are cached.
-ISO_INLINE void load_corners(const FrameParams *frame, global const BlockEntry *table,
+ISO_INLINE void load_corners(const FrameParams *frame, global const uint *table,
                              global const SlotValue *cache_values, int x, int y, int z, float *w) {
   for (int corner = 0; corner < 8; ++corner) {
     const uint vx = (uint)(x + (corner & 1)), vy = (uint)(y + (corner >> 1 & 1)),

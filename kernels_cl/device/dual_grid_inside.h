@@ -8,7 +8,7 @@
 
 /// The voxels that are inside, for each block of the dual grid of block b, corner x + 2y + 4z; 0
 /// for blocks that do not exist.
-ISO_INLINE void dual_grid_inside(const FrameParams *frame, global const BlockEntry *table,
+ISO_INLINE void dual_grid_inside(const FrameParams *frame, global const uint *table,
                                  global const ulong *inside, BlockCoords b, ulong *bits) {
   for (uint corner = 0; corner < 8; ++corner) {
     uint slot = ISO_BLOCK_ABSENT;

@@ -8,28 +8,22 @@
 
 /// Looks for those of the 2^3 blocks from `base` on whose bits (corner x + 2y + 4z) are set in
 /// `wanted`. Returns which of them are cached, and their places in slots [8], ISO_SCRATCH_STRIDE
-/// apart. All are read before one is looked at: a GPU waits once.
-ISO_LONG uint find_slots(const FrameParams *frame, global const BlockEntry *table, BlockCoords base,
+/// apart. In steps for all of them, as find_dual_grid().
+ISO_LONG uint find_slots(const FrameParams *frame, global const uint *table, BlockCoords base,
                          uint wanted, ISO_SCRATCH uint *slots) {
-  uint keys[8], found[8], have = 0;
+  const uint none = empty_page(frame->schedule.cache_slots);
+  uint pages[8], have = 0;
   ISO_UNROLL
   for (uint corner = 0; corner < 8; ++corner) {
-    keys[corner] = ISO_INVALID_ID;
-    found[corner] = ISO_BLOCK_ABSENT;
-    if ((wanted >> corner & 1u) != 0) {
-      const uint home = table_home(frame, base.x + (corner & 1), base.y + (corner >> 1 & 1),
-                                   base.z + (corner >> 2));
-      keys[corner] = table[home].block_id;
-      found[corner] = table[home].slot;
-    }
+    pages[corner] = (wanted >> corner & 1u) != 0
+                        ? table[directory_word(frame, base.x + (corner & 1),
+                                               base.y + (corner >> 1 & 1), base.z + (corner >> 2))]
+                        : none;
   }
   ISO_UNROLL
   for (uint corner = 0; corner < 8; ++corner) {
-    const uint x = base.x + (corner & 1), y = base.y + (corner >> 1 & 1),
-               z = base.z + (corner >> 2);
-    uint slot = found[corner];
-    if (keys[corner] != ISO_INVALID_ID && keys[corner] != block_id_at(frame, x, y, z))
-      slot = cached_slot(frame, table, x, y, z);
+    const uint slot = table[page_word(frame, pages[corner], base.x + (corner & 1),
+                                      base.y + (corner >> 1 & 1), base.z + (corner >> 2))];
     slots[corner * ISO_SCRATCH_STRIDE] = slot;
     have |= (uint)(slot != ISO_BLOCK_ABSENT) << corner;
   }

@@ -13,8 +13,9 @@
 
 /// The cache (block_cache.cl), as a work-item looks into it.
 typedef struct CacheReader {
-  global BlockEntry *table;
+  global const uint *table;
   global const ulong *inside;
+  global ulong *changing;
   global const SlotValue *values;
   global uint *slot_stamps;
   uint stamp;  ///< read_stamp() of the pass: the stamp of every cached block that is opened
@@ -65,52 +66,34 @@ ISO_INLINE ulong cells_of_corners(uint corners) {
   return cells;
 }
 
-#if ISO_ON_DEMAND
-/// The cells of block b that the table knows. To be called when the block's slot has been seen:
-/// parts of the entry that were read before the slot may be older (on_demand.h).
-ISO_INLINE ulong known_cells(const FrameParams *frame, global const BlockEntry *table,
-                             BlockCoords b) {
-  volatile global const BlockEntry *entry = &table[find_entry(frame, table, b.x, b.y, b.z)];
-  return (ulong)entry->changing_high << 32 | entry->changing_low;
-}
-#endif
-
 /// The cells of block b that a ray must look into: those in which inside changes, and those that
-/// need a block that is not cached. The cells are kept in the block's table entry for the next ray.
+/// need a block that is not cached. The cells are kept with the block's slot for the next ray.
 ///
 /// Out  cache->slots; *have: which corners of the dual grid are cached, or beyond the volume, where
 ///      no cell of the domain reaches
 ISO_INLINE ulong open_block(const FrameParams *frame, const CacheReader *cache, BlockCoords b,
                             uint *have) {
-  global BlockEntry *table = cache->table;
-  BlockEntry entries[8];
-  ulong cells;
-  find_dual_grid(frame, table, b.x, b.y, b.z, entries);
+  uint slots[8];
+  ulong cells = 0;
+  find_dual_grid(frame, cache->table, b.x, b.y, b.z, slots);
   *have = (b.x + 1 == frame->grid.blocks_x ? 0xAAu : 0u) |
           (b.y + 1 == frame->grid.blocks_y ? 0xCCu : 0u) |
           (b.z + 1 == frame->grid.blocks_z ? 0xF0u : 0u);
   ISO_UNROLL
   for (uint corner = 0; corner < 8; ++corner) {
-    cache->slots[corner * ISO_SCRATCH_STRIDE] = entries[corner].slot;
-    *have |= (uint)(entries[corner].slot != ISO_BLOCK_ABSENT) << corner;
+    cache->slots[corner * ISO_SCRATCH_STRIDE] = slots[corner];
+    *have |= (uint)(slots[corner] != ISO_BLOCK_ABSENT) << corner;
   }
-  cells = (ulong)entries[0].changing_high << 32 | entries[0].changing_low;
-#if ISO_ON_DEMAND
-  if ((*have & 1u) != 0) cells = known_cells(frame, table, b);
-#endif
-  if ((*have & 1u) != 0 && cells == ISO_CHANGING_UNKNOWN) {
+  if ((*have & 1u) != 0) cells = cache->changing[slots[0]];
+  if (cells == ISO_CHANGING_UNKNOWN) {
     ulong voxels[8];
     ISO_UNROLL
     for (uint corner = 0; corner < 8; ++corner) {
-      const uint slot = entries[corner].slot;
+      const uint slot = slots[corner];
       voxels[corner] = slot == ISO_BLOCK_ABSENT ? 0 : cache->inside[slot];
     }
     cells = changing_cells(voxels) | cells_of_corners(~*have & 0xFFu);
-    if (!ISO_CHECK_RACES && *have == 0xFFu) {
-      global BlockEntry *entry = &table[find_entry(frame, table, b.x, b.y, b.z)];
-      entry->changing_low = (uint)cells;
-      entry->changing_high = (uint)(cells >> 32);
-    }
+    if (!ISO_CHECK_RACES && *have == 0xFFu) cache->changing[slots[0]] = cells;
   }
   return cells;
 }

@@ -7,15 +7,15 @@
 /// that, but not for long: then their rays wait for the next pass, as do those for which there is
 /// no slot. So nothing depends on when other work-items run.
 ///
-/// Order of memory: a block's values, bits and stamp, and what its entry says of its cells, are
-/// written before an atomic_xchg gives the entry its slot. A reader of an entry looks at the slot
-/// first, and at all else when there is one. OpenCL 1.2 orders no memory between work-groups.
-/// PoCL does: its atomic functions are LLVM's with order acq_rel (seen in PoCL 3.1's library for
-/// x86), so a work-item that reads the slot sees the stores before the atomic_xchg. Data of a
-/// slot are found by the slot's number, so they are loaded after the slot.
+/// Order of memory: a block's values, bits, cells and stamp are written before an atomic_xchg gives
+/// the block its slot in the table. OpenCL 1.2 orders no memory between work-groups. PoCL does: its
+/// atomic functions are LLVM's with order acq_rel (seen in PoCL 3.1's library for x86), so a
+/// work-item that reads the slot sees the stores before the atomic_xchg. Data of a slot are found
+/// by the slot's number, so they are loaded after the slot.
 #ifndef ISOWAVE_ON_DEMAND_H
 #define ISOWAVE_ON_DEMAND_H
 
+#include "block_pages.h"
 #include "block_requests.h"
 #include "block_stream.h"
 #include "slot_values.h"
@@ -29,15 +29,15 @@ typedef struct BlockMaker {
   global const uint *part_0, *part_1, *part_2, *part_3, *index;
   StreamLayout layout;
   float isovalue;
-  global BlockEntry *table;
+  global uint *table;
   global SlotValue *values;
-  global ulong *inside;
+  global ulong *inside, *changing;
   global uint *slot_block_ids, *slot_stamps, *requested_bits;
   global const uint *free_slots;
   global CacheState *cache;
   uint stamp;     ///< read_stamp() of the pass
   uint num_made;  ///< blocks decoded by this work-item
-  int is_full;    ///< it has found no slot, or no entry
+  int is_full;    ///< it has found no slot
 } BlockMaker;
 
 /// Takes the last free slot. Returns ISO_BLOCK_ABSENT if there is none.
@@ -51,29 +51,15 @@ ISO_INLINE uint take_free_slot(const BlockMaker *maker) {
   return before > 0 ? maker->free_slots[before - 1] : ISO_BLOCK_ABSENT;
 }
 
-/// Counts one more key in the table. Returns 0 if it has no room for one.
-ISO_INLINE int count_key(const FrameParams *frame, global CacheState *cache) {
-  const int fits = !table_is_full(frame, atomic_inc(&cache->table_count) + 1);
-  if (!fits) atomic_dec(&cache->table_count);
-  return fits;
-}
-
 /// Decodes block b, which this work-item has marked, unless that has been done.
 ISO_INLINE void make_block(BlockMaker *maker, const FrameParams *frame, BlockCoords b) {
-  const uint block_id = block_id_at(frame, b.x, b.y, b.z);
-  uint entry = find_entry(frame, maker->table, b.x, b.y, b.z), slot, v;
-  const int is_new = entry == ISO_INVALID_ID;
+  uint slot, v;
   float values[ISO_BLOCK_VOXELS];
   ulong inside = 0;
-  if (!is_new && maker->table[entry].slot != ISO_BLOCK_ABSENT) return;
-  maker->is_full = is_new && !count_key(frame, maker->cache);
-  if (maker->is_full) return;
+  if (slot_by_now(frame, maker->table, b) != ISO_BLOCK_ABSENT) return;
   slot = take_free_slot(maker);
   maker->is_full = slot == ISO_BLOCK_ABSENT;
-  if (maker->is_full) {
-    if (is_new) atomic_dec(&maker->cache->table_count);
-    return;
-  }
+  if (maker->is_full) return;
   decode_block(maker->part_0, maker->part_1, maker->part_2, maker->part_3, maker->index,
                maker->layout, level_block_at(frame, b.x, b.y, b.z), 0, values);
   for (v = 0; v < ISO_BLOCK_VOXELS; ++v) {
@@ -81,16 +67,16 @@ ISO_INLINE void make_block(BlockMaker *maker, const FrameParams *frame, BlockCoo
     inside |= (ulong)(field_of_slot(frame, values[v]) - maker->isovalue >= 0.0f) << v;
   }
   maker->inside[slot] = inside;
-  maker->slot_block_ids[slot] = block_id;
+  maker->changing[slot] = ISO_CHANGING_UNKNOWN;
+  maker->slot_block_ids[slot] = block_id_at(frame, b.x, b.y, b.z);
   maker->slot_stamps[slot] = maker->stamp;
   ++maker->num_made;
-  if (is_new) entry = table_key(frame, maker->table, b, block_id);
-  maker->table[entry].changing_low = maker->table[entry].changing_high = (uint)ISO_CHANGING_UNKNOWN;
-  atomic_xchg((volatile global uint *)&maker->table[entry].slot, slot);
+  atomic_xchg((volatile global uint *)&maker->table[enter_block(frame, maker->table, b, slot)],
+              slot);
 }
 
 /// Has blocks of the dual grid of block b decoded, those of some of its corners (bits 0..7). They
-/// are in the table then, unless there was no room, or others took too long.
+/// are in the table then, unless there was no slot, or others took too long.
 ISO_RARE void bring_corners(BlockMaker *maker, const FrameParams *frame, BlockCoords b,
                             uint corners) {
   uint others = 0, corner, looks;

@@ -72,18 +72,16 @@ ISO_SELDOM void open_with_voxels(const CacheReader *cache, const FrameParams *fr
   }
 }
 
-/// Opens block b if the table knows its cells, or if it is not cached; without voxels, since rays
+/// Opens block b if its cells are known, or if it is not cached; without voxels, since rays
 /// pass by the cells of every third block. Else returns 0.
 ISO_INLINE int open_without_voxels(const CacheReader *cache, const FrameParams *frame,
                                    BlockCoords b, OpenedBlock *opened) {
-  /* Parts of an entry that are read before its slot may be older (on_demand.h). */
-  volatile global const BlockEntry *entries = cache->table;
-  const uint entry = find_entry(frame, cache->table, b.x, b.y, b.z),
-             slot = entry == ISO_INVALID_ID ? ISO_BLOCK_ABSENT : entries[entry].slot;
+  const uint slot = slot_by_now(frame, cache->table, b);
   opened->have = 0;
   if (slot != ISO_BLOCK_ABSENT) {
-    opened->cells_low = entries[entry].changing_low;
-    opened->cells_high = entries[entry].changing_high;
+    const ulong cells = cache->changing[slot];
+    opened->cells_low = (uint)cells;
+    opened->cells_high = (uint)(cells >> 32);
     if ((opened->cells_low & opened->cells_high) == (uint)ISO_CHANGING_UNKNOWN) return 0;
     opened->have = ISO_OPENED_CACHED;
     cache->slot_stamps[slot] = cache->stamp;

@@ -16,8 +16,7 @@
 
 /// The voxels of cached block b that are inside, a bit for each.
 ISO_INLINE ulong inside_of(const CacheReader *cache, const FrameParams *frame, BlockCoords b) {
-  volatile global const BlockEntry *entries = cache->table;
-  return cache->inside[entries[find_entry(frame, cache->table, b.x, b.y, b.z)].slot];
+  return cache->inside[slot_by_now(frame, cache->table, b)];
 }
 
 /// Lanes at `bits`, low and high half, of their numbers, 0 to 63.

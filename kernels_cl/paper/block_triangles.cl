@@ -19,7 +19,7 @@
 /// Out             num_triangles: of entry i at i - first
 /// Launch          grid-stride over entries
 kernel void block_triangles_count(const FrameParams frame_params, uint begin, uint end, uint first,
-                                  global const uint *block_ids, global const BlockEntry *table,
+                                  global const uint *block_ids, global const uint *table,
                                   global const ulong *inside, global const uchar *cell_triangles,
                                   global const uint *index, uint no_data_begin,
                                   global uint *num_triangles) {
@@ -65,10 +65,9 @@ ISO_INLINE uint edge_steps(local const uint *slots, global const SlotValue *valu
 /// Launch   groups of up to 64, which stride over entries
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void block_triangles_write(
     const FrameParams frame_params, uint begin, uint end, uint first, uint skipped,
-    global const uint *block_ids, global const BlockEntry *table,
-    global const SlotValue *cache_values, global const ulong *inside,
-    global const uchar *cell_triangles, global const uint *index, uint no_data_begin,
-    global const uint *offsets, global BlockVertex *vertices) {
+    global const uint *block_ids, global const uint *table, global const SlotValue *cache_values,
+    global const ulong *inside, global const uchar *cell_triangles, global const uint *index,
+    uint no_data_begin, global const uint *offsets, global BlockVertex *vertices) {
   const FrameParams *frame = &frame_params;
   const BlockGrid grid = frame_params.grid;
   const NoDataTable no_data = {index, no_data_begin};

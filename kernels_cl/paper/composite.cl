@@ -15,7 +15,7 @@
 kernel void composite(const FrameParams frame_params, global PassCounts *counts,
                       global uint *active_ray_ids, global const uint *pair_block_ids,
                       global const uint *pair_begins, global const PairHit *pair_hits,
-                      global const uint *closest_pairs, global const BlockEntry *table,
+                      global const uint *closest_pairs, global const uint *table,
                       global const SlotValue *cache_values, global uint *ray_block_ids,
                       global HitRecord *hits, global uint *ray_active_mask) {
   const FrameParams *frame = &frame_params;

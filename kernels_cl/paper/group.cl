@@ -19,17 +19,16 @@
 
 /// Whether every block of the dual grid of block b is cached: all or nothing. slot: its own.
 ISO_INLINE int dual_grid_is_cached(const FrameParams *frame, BlockCoords b,
-                                   global const BlockEntry *table, uint *slot) {
+                                   global const uint *table, uint *slot) {
   const uint outside = (b.x + 1 == frame->grid.blocks_x ? 0xAAu : 0u) |
                        (b.y + 1 == frame->grid.blocks_y ? 0xCCu : 0u) |
                        (b.z + 1 == frame->grid.blocks_z ? 0xF0u : 0u);
-  BlockEntry entries[8];
-  uint absent = 0;
-  find_dual_grid(frame, table, b.x, b.y, b.z, entries);
+  uint slots[8], absent = 0;
+  find_dual_grid(frame, table, b.x, b.y, b.z, slots);
   ISO_UNROLL
   for (uint corner = 0; corner < 8; ++corner)
-    absent |= (uint)(entries[corner].slot == ISO_BLOCK_ABSENT) << corner;
-  *slot = entries[0].slot;
+    absent |= (uint)(slots[corner] == ISO_BLOCK_ABSENT) << corner;
+  *slot = slots[0];
   return (absent & ~outside) == 0;
 }
 
@@ -43,7 +42,7 @@ ISO_INLINE int dual_grid_is_cached(const FrameParams *frame, BlockCoords b,
 /// Launch  groups stride over tiles of pairs; each appends with one global atomic a tile
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_select(
     const FrameParams frame_params, global PassCounts *counts, global const uint *pair_block_ids,
-    global const BlockEntry *table, global const uint *pair_rays, global PairHit *pair_hits,
+    global const uint *table, global const uint *pair_rays, global PairHit *pair_hits,
     global uint *closest_pairs, global uint *pair_ids, global uint *keys) {
   const FrameParams *frame = &frame_params;
   local uint num_granted, first_place;
@@ -139,24 +138,20 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_he
 }
 
 /// slots [ISO_GROUP_ITEMS]: of these blocks; ISO_BLOCK_ABSENT of one that is not cached, and of
-/// ISO_INVALID_ID. As find_dual_grid(), reads all first entries before it looks at one.
-ISO_INLINE void find_slots(const FrameParams *frame, global const BlockEntry *table,
+/// ISO_INVALID_ID. In steps for all of them, as find_dual_grid().
+ISO_INLINE void find_slots(const FrameParams *frame, global const uint *table,
                            const uint *block_ids, uint *slots) {
-  BlockEntry entries[ISO_GROUP_ITEMS];
+  uint pages[ISO_GROUP_ITEMS];
   ISO_UNROLL
   for (uint i = 0; i < ISO_GROUP_ITEMS; ++i) {
     const BlockCoords b = block_coords(frame, block_ids[i]);
-    entries[i] = table[table_home(frame, b.x, b.y, b.z)];
+    pages[i] = block_ids[i] == ISO_INVALID_ID ? empty_page(frame->schedule.cache_slots)
+                                              : table[directory_word(frame, b.x, b.y, b.z)];
   }
   ISO_UNROLL
   for (uint i = 0; i < ISO_GROUP_ITEMS; ++i) {
-    slots[i] = ISO_BLOCK_ABSENT;
-    if (block_ids[i] != ISO_INVALID_ID && entries[i].block_id == block_ids[i]) {
-      slots[i] = entries[i].slot;
-    } else if (block_ids[i] != ISO_INVALID_ID && entries[i].block_id != ISO_INVALID_ID) {
-      const BlockCoords b = block_coords(frame, block_ids[i]);
-      slots[i] = cached_slot(frame, table, b.x, b.y, b.z);
-    }
+    const BlockCoords b = block_coords(frame, block_ids[i]);
+    slots[i] = table[page_word(frame, pages[i], b.x, b.y, b.z)];
   }
 }
 
@@ -167,7 +162,7 @@ ISO_INLINE void find_slots(const FrameParams *frame, global const BlockEntry *ta
 /// Launch  groups stride over tiles of pairs; each appends with one global atomic a tile
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_count(
     const FrameParams frame_params, global const PassCounts *counts,
-    global const uint *pair_block_ids, global const BlockEntry *table, global uint *pair_slots,
+    global const uint *pair_block_ids, global const uint *table, global uint *pair_slots,
     global uint *pair_ranks, global uint *slot_counts, global uint *candidate_slots,
     global uint *candidate_count) {
   const FrameParams *frame = &frame_params;
@@ -217,9 +212,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_co
 /// Launch  groups stride over the candidates; each draws places with two global atomics a turn
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void group_blocks(
     const FrameParams frame_params, global PassCounts *counts, global const uint *candidate_slots,
-    global const uint *candidate_count, global const uint *slot_block_ids,
-    global const BlockEntry *table, global uint *slot_counts, global uint *slot_offsets,
-    global BlockRays *block_rays) {
+    global const uint *candidate_count, global const uint *slot_block_ids, global const uint *table,
+    global uint *slot_counts, global uint *slot_offsets, global BlockRays *block_rays) {
   const FrameParams *frame = &frame_params;
   local uint num_blocks, num_pairs, first_block, first_pair;
   const uint candidates = *candidate_count, item = get_local_id(0);

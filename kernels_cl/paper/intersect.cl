@@ -41,7 +41,7 @@ ISO_INLINE PairHit intersect_block(const Ray *ray, BlockCoords b, LastPlanes las
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void intersect(
     const FrameParams frame_params, uint parts, global const PassCounts *counts,
     global const uint *pair_ids, global const BlockRays *block_rays,
-    global const uint *pair_block_ids, global const BlockEntry *table,
+    global const uint *pair_block_ids, global const uint *table,
     global const SlotValue *cache_values, global const uint *active_ray_ids,
     global const uint *pair_rays, global PairHit *pair_hits, global uint *closest_pairs) {
   const FrameParams *frame = &frame_params;
@@ -90,7 +90,7 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void intersec
 /// Launch  grid-stride over the pairs, in `parts` launches (ocl::Range)
 kernel void settle_doubts(const FrameParams frame_params, uint parts,
                           global const PassCounts *counts, global const uint *pair_ids,
-                          global const uint *pair_block_ids, global const BlockEntry *table,
+                          global const uint *pair_block_ids, global const uint *table,
                           global const SlotValue *cache_values, global const uint *active_ray_ids,
                           global const uint *pair_rays, global PairHit *pair_hits,
                           global uint *closest_pairs) {

@@ -1,9 +1,14 @@
-/// block_table.h -- which cache slot a block is in: a hash table of O(slots), not of O(blocks).
+/// block_table.h -- which cache slot a block is in: a table of pages.
 ///
-/// Open addressing. The eight blocks of a 2^3 group begin their search side by side, for a ray asks
-/// for neighbours. An entry whose block was evicted keeps its key until the table is rebuilt
-/// (block_cache.cl); at least three eighths of the entries have no key, so every search ends, and
-/// most soon.
+/// A page has the slots of a group of 2^3 blocks, since a ray asks for neighbours. The directory
+/// has a page for each group. There are as many pages as slots, so that none is ever missing: a
+/// group has a page only while one of its blocks is cached. All groups without blocks have the page
+/// behind these, of which all slots are ISO_BLOCK_ABSENT: looking a block up needs no branch.
+///
+/// In words, for S slots:
+///   [8 * (S + 1)]  pages; in each x + 2y + 4z
+///   [S]            how many blocks of each page are cached; 0: it is free
+///   [groups]       the directory; and some more, for neighbours of the last groups
 #ifndef ISOWAVE_BLOCK_TABLE_H
 #define ISOWAVE_BLOCK_TABLE_H
 
@@ -11,21 +16,9 @@
 
 ISO_NAMESPACE_BEGIN
 
-typedef struct BlockEntry {
-  uint block_id;       ///< ISO_INVALID_ID: never used
-  uint slot;           ///< ISO_BLOCK_ABSENT: evicted
-  uint changing_low;   ///< bit x + 4y + 16z: does inside change in the cell? z = 0, 1
-  uint changing_high;  ///< z = 2, 3
-} BlockEntry;
-ISO_CHECK_SIZE(BlockEntry, 16);
-
-/// Both halves of the changing cells of a block that no ray has looked at. A work-item that reads
-/// while another writes may get one half of each: cells too many, which does no harm.
+/// The cells of a slot that no ray has looked at, in both halves. A work-item that reads while
+/// another writes may get one half of each: cells too many, which does no harm.
 #define ISO_CHANGING_UNKNOWN 0xFFFFFFFFFFFFFFFFul
-
-ISO_INLINE ulong changing_of(ISO_GLOBAL const BlockEntry *entry) {
-  return (ulong)entry->changing_high << 32 | entry->changing_low;
-}
 
 /// Counts and places that the cache's kernels leave for each other, and for the next pass.
 typedef struct CacheState {
@@ -34,8 +27,6 @@ typedef struct CacheState {
   uint first_touched;  ///< these blocks (bits 0..7, corner x + 2y + 4z)
   uint free_count;     ///< slots that hold no block, before the pass's grants
   uint granted;        ///< slots given in the pass
-  uint table_count;  ///< at least the keys in the table before the pass's grants, those of evicted
-                     ///< blocks included
   /* The outcome of cache_select: */
   uint free_before;   ///< free slots before eviction
   uint cutoff_rank;   ///< all slots of higher ranks are victims (slot_stamps.h) ...
@@ -43,68 +34,64 @@ typedef struct CacheState {
   uint num_evicted;   ///< so far
   uint num_cutoff;    ///< tickets drawn by slots of the cutoff rank
   uint recycled;      ///< of the victims, those that their own frame had used
-  uint rebuild;       ///< the table has too many keys of evicted blocks
 } CacheState;
 
-#define ISO_TABLE_STEP \
-  9u  ///< from entry to entry of a search; odd, and no factor of the table's size
-
-/// The first entry of the search for block (x,y,z). frame->schedule.table_groups: entries / 8.
-ISO_INLINE uint table_home(const FrameParams *frame, uint x, uint y, uint z) {
-  const uint layer = id_layer(frame, z); /* the same seen from every level */
-  uint h = ((x >> 1) * 0x9E3779B1u) ^ ((y >> 1) * 0x85EBCA77u) ^ ((layer >> 1) * 0xC2B2AE3Du);
-  h = (h ^ (h >> 15)) * 0x2C1B3C6Du;
-  h ^= h >> 13;
-  return 8u * (uint)(((ulong)h * frame->schedule.table_groups) >> 32) + (x & 1u) + 2u * (y & 1u) +
-         4u * (layer & 1u);
+/// The page of groups without cached blocks, of a cache with so many slots.
+ISO_INLINE uint empty_page(uint num_slots) {
+  return num_slots;
+}
+/// Words: of page counts, and the directory.
+ISO_INLINE uint page_count_at(uint num_slots, uint page) {
+  return 8u * (num_slots + 1u) + page;
+}
+ISO_INLINE uint directory_begin(uint num_slots) {
+  return page_count_at(num_slots, num_slots);
 }
 
-ISO_INLINE uint table_next(const FrameParams *frame, uint entry) {
-  const uint next = entry + ISO_TABLE_STEP, size = 8u * frame->schedule.table_groups;
-  return next >= size ? next - size : next;
+/// The number of a block's group: x, y, layer of the block in the grid in which ids count, which is
+/// so many blocks wide.
+ISO_INLINE uint group_of_block(uint blocks_x, uint blocks_y, uint x, uint y, uint layer) {
+  return x / 2u + (blocks_x + 1u) / 2u * (y / 2u + (blocks_y + 1u) / 2u * (layer / 2u));
 }
 
-/// The table entry of block (x,y,z), or ISO_INVALID_ID if it has none.
-ISO_INLINE uint find_entry(const FrameParams *frame, ISO_GLOBAL const BlockEntry *table, uint x,
-                           uint y, uint z) {
-  const uint block_id = block_id_at(frame, x, y, z);
-  uint i = table_home(frame, x, y, z), key = table[i].block_id;
-  while (key != block_id && key != ISO_INVALID_ID) {
-    i = table_next(frame, i);
-    key = table[i].block_id;
-  }
-  return key == block_id ? i : ISO_INVALID_ID;
+/// The word of the directory for block (x,y,z). A block beyond the volume has that of any other.
+ISO_INLINE uint directory_word(const FrameParams *frame, uint x, uint y, uint z) {
+  return directory_begin(frame->schedule.cache_slots) +
+         group_of_block(id_blocks_x(frame), id_blocks_y(frame), x, y, id_layer(frame, z));
 }
 
-/// The entries of the dual grid of block (x,y,z): corner x + 2y + 4z; slot ISO_BLOCK_ABSENT if a
-/// block is not cached. All eight are read before one is looked at: a GPU waits once, not eight
-/// times.
-ISO_INLINE void find_dual_grid(const FrameParams *frame, ISO_GLOBAL const BlockEntry *table, uint x,
-                               uint y, uint z, BlockEntry *entries) {
-  uint corner;
-  ISO_UNROLL
-  for (corner = 0; corner < 8u; ++corner) {
-    entries[corner] =
-        table[table_home(frame, x + (corner & 1u), y + (corner >> 1 & 1u), z + (corner >> 2))];
-  }
-  ISO_UNROLL
-  for (corner = 0; corner < 8u; ++corner) {
-    const uint bx = x + (corner & 1u), by = y + (corner >> 1 & 1u), bz = z + (corner >> 2);
-    const uint key = entries[corner].block_id;
-    if (key != block_id_at(frame, bx, by, bz)) {
-      const uint entry =
-          key == ISO_INVALID_ID ? ISO_INVALID_ID : find_entry(frame, table, bx, by, bz);
-      entries[corner].slot = ISO_BLOCK_ABSENT;
-      if (entry != ISO_INVALID_ID) entries[corner] = table[entry];
-    }
-  }
+/// The word of block (x,y,z), whose group has this page.
+ISO_INLINE uint page_word(const FrameParams *frame, uint page, uint x, uint y, uint z) {
+  return 8u * page + (x & 1u) + 2u * (y & 1u) + 4u * (id_layer(frame, z) & 1u);
 }
 
 /// The slot of block (x,y,z), or ISO_BLOCK_ABSENT.
-ISO_INLINE uint cached_slot(const FrameParams *frame, ISO_GLOBAL const BlockEntry *table, uint x,
-                            uint y, uint z) {
-  const uint entry = find_entry(frame, table, x, y, z);
-  return entry == ISO_INVALID_ID ? ISO_BLOCK_ABSENT : table[entry].slot;
+ISO_INLINE uint cached_slot(const FrameParams *frame, ISO_GLOBAL const uint *table, uint x, uint y,
+                            uint z) {
+  return table[page_word(frame, table[directory_word(frame, x, y, z)], x, y, z)];
+}
+
+/// cached_slot() at this moment, while others enter blocks.
+ISO_INLINE uint slot_by_now(const FrameParams *frame, volatile ISO_GLOBAL const uint *table,
+                            BlockCoords b) {
+  return table[page_word(frame, table[directory_word(frame, b.x, b.y, b.z)], b.x, b.y, b.z)];
+}
+
+/// slots [8]: those of the dual grid of block (x,y,z), corner x + 2y + 4z; ISO_BLOCK_ABSENT if a
+/// block is not cached. In steps for all eight: a GPU waits twice, not sixteen times.
+ISO_INLINE void find_dual_grid(const FrameParams *frame, ISO_GLOBAL const uint *table, uint x,
+                               uint y, uint z, uint *slots) {
+  uint pages[8], corner;
+  ISO_UNROLL
+  for (corner = 0; corner < 8u; ++corner) {
+    pages[corner] =
+        table[directory_word(frame, x + (corner & 1u), y + (corner >> 1 & 1u), z + (corner >> 2))];
+  }
+  ISO_UNROLL
+  for (corner = 0; corner < 8u; ++corner) {
+    slots[corner] = table[page_word(frame, pages[corner], x + (corner & 1u), y + (corner >> 1 & 1u),
+                                    z + (corner >> 2))];
+  }
 }
 
 ISO_NAMESPACE_END

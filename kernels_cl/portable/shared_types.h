@@ -251,7 +251,7 @@ ISO_CHECK_SIZE(ScreenBox, 16);
 typedef struct Schedule {
   uint max_spec_count;       ///< 1..ISO_MAX_SPECULATION; 1 turns speculation off
   uint per_ray_speculation;  ///< each ray looks ahead by what it has missed, not all alike
-  uint table_groups;         ///< entries / 8 of the block cache's table (block_table.h)
+  uint cache_slots;          ///< of the block cache
   uint scanned_pairs;        ///< pipeline `blocks`: rays have as many places for pairs as they fill
                              ///< (ray_pairs.h)
 } Schedule;

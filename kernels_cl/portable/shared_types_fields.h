@@ -23,7 +23,7 @@
   X(surface.active_begin_x) X(surface.active_begin_y) X(surface.active_begin_z)                \
   X(surface.active_end_x) X(surface.active_end_y) X(surface.active_end_z)                      \
   X(screen.begin_x) X(screen.begin_y) X(screen.end_x) X(screen.end_y)                          \
-  X(schedule.max_spec_count) X(schedule.per_ray_speculation) X(schedule.table_groups)          \
+  X(schedule.max_spec_count) X(schedule.per_ray_speculation) X(schedule.cache_slots)          \
   X(schedule.scanned_pairs)
 #define ISO_PAIR_HIT_FIELDS(X) X(cell) X(s)
 #define ISO_BLOCK_RAYS_FIELDS(X) X(begin) X(end)

@@ -65,7 +65,7 @@ ISO_INLINE uint speculation_count(const FrameParams *frame, uint num_rays) {
 ISO_INLINE uint most_ahead(const FrameParams *frame, uint window, uint num_rays) {
   uint most = ISO_MAX_SPECULATION;
   if (window < frame_rays(frame)) {
-    most = 4 * frame->schedule.table_groups / (num_rays + 1);
+    most = frame->schedule.cache_slots / (num_rays + 1);
     if (most == 0) most = 1;
   }
   return most;
