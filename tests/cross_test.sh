@@ -114,12 +114,12 @@ one_line render "$fuel" -i 10 -o missing/picture.png
 [ ! -e none.png ] || fail 'a picture without a device'
 
 # Names of files.
-folder='with blanks'
+folder='with blanks, ä, 漢 and 🫖'
 mkdir "$folder"
 cp "$fuel" "$folder/a b_64x33x32_uint8.raw.gz"
 quietly "$build/run" "$there" convert "$folder/a b_64x33x32_uint8.raw.gz" -o "$folder/c d.zfp"
 quietly "$program" convert "$fuel" -o native.zfp
-cmp native.zfp "$folder/c d.zfp" || fail 'a file whose name has blanks is another'
+cmp native.zfp "$folder/c d.zfp" || fail 'a file whose name has blanks and other letters is another'
 one_line info "$folder/e f.zfp"
 [ "$(find "$folder" -name '.isowave*')" = '' ] || fail 'a temporary file is left'
 echo "$system: $num_volumes volumes"
