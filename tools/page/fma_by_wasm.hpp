@@ -4,7 +4,8 @@
 // Clang 14 makes one instruction of a scalar's load and its copy to all lanes (v128.load32_splat),
 // and may put it behind stores to the same address, such as those to the next variable of a stack
 // slot. At -O2, rays then met other surfaces behind translucent ones. A scalar that has gone
-// through an empty asm is no load, so nothing is moved.
+// through an empty asm is no load, so nothing is moved. The compiler looks for no vectors in the
+// loops (-fno-slp-vectorize), since it copies loads to their lanes.
 #pragma once
 #define ISOWAVE_FMA_BY_WASM_H
 
@@ -24,8 +25,9 @@ inline float fma_by_wasm(float a, float b, float c) {
 
 /// Is it the instruction? What replaces it computes a * b + c, for f32x4.relaxed_nmadd, too.
 inline bool fma_is_fused() {
-  const FourLanes one = to_lanes(1.0f);
-  return __builtin_wasm_fms_f32x4(one, one, FourLanes{})[0] < 0.0f;
+  volatile float one = 1.0f;  // so that no compiler computes the rest
+  const FourLanes a = to_lanes(one);
+  return __builtin_wasm_fms_f32x4(a, a, FourLanes{})[0] < 0.0f;
 }
 
 }  // namespace isowave::core
