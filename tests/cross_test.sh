@@ -21,8 +21,8 @@ quietly() { # quietly COMMAND...
   "$@" > "$work/log" 2>&1 || { cat "$work/log"; fail "$1 fails"; }
 }
 
-# run_there PROGRAM ARGUMENT...: once more if it never ends. Under Wine 8, some do not: one thread is
-# left, which waits in NtWaitForMultipleObjects().
+# run_there PROGRAM ARGUMENT...: once more if it never ends. Under Wine 8, some do not: one thread
+# is left, which waits in NtWaitForMultipleObjects().
 run_there() {
   local limit=0 status=0
   [ "$system" != windows ] || limit=240

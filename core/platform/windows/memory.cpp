@@ -17,8 +17,7 @@ namespace {
 
 constexpr std::uintptr_t kPageBytes = 1u << 16;  ///< Windows reserves addresses by as many
 
-/// A std::shared_mutex by Windows. With that of winpthreads, programs under Wine waited for ever more
-/// often.
+/// A std::shared_mutex by Windows. With that of winpthreads, more programs under Wine never ended.
 class SharedMutex {
  public:
   void lock() { ::AcquireSRWLockExclusive(&lock_); }
