@@ -21,6 +21,20 @@ quietly() { # quietly COMMAND...
   "$@" > "$work/log" 2>&1 || { cat "$work/log"; fail "$1 fails"; }
 }
 
+# run_there PROGRAM ARGUMENT...: once more if it never ends. Under Wine 8, some do not: one thread
+# is left, which waits in NtWaitForMultipleObjects().
+run_there() {
+  local limit=0 status=0
+  [ "$system" != windows ] || limit=240
+  for _ in 1 2 3; do
+    status=0
+    timeout "$limit" "$build/run" "$@" || status=$?
+    [ "$status" = 124 ] || return "$status"
+    echo "$1 did not end in $limit s" >> "$work/stuck"
+  done
+  return 124
+}
+
 missing=$("$source/tools/cross" --missing "$system")
 if [ -n "$missing" ]; then
   echo "not tested: $missing is missing, which tools/setup --long installs"
@@ -54,7 +68,7 @@ compile_user "$work/native_user" -DCMAKE_PREFIX_PATH="$work/prefix"
 # both NAME FILE ISOVALUE: runs library and program of one system in the current folder
 both() {
   local run=() user_here=$work/native_user/host_only program_here=$program
-  if [ "$1" = there ]; then run=("$build/run") user_here=$user program_here=$there; fi
+  if [ "$1" = there ]; then run=(run_there) user_here=$user program_here=$there; fi
   quietly "${run[@]}" "$user_here" "$2" "$3" . 10
   quietly "${run[@]}" "$program_here" convert "$2" --rate 6 --levels all -o lossy.zfp
   quietly "${run[@]}" "$program_here" render lossy.zfp -i "$3" --size 160x90 --device host \
@@ -98,7 +112,7 @@ END
 
 cd "$work"
 one_line() { # one_line ARGUMENT...: both programs fail, and say so in the same line
-  if "$build/run" "$there" "$@" > out 2> error; then fail "no error: $*"; fi
+  if run_there "$there" "$@" > out 2> error; then fail "no error: $*"; fi
   if "$program" "$@" > out 2> expected; then fail "no error: $*"; fi
   [ "$(wc -l < error)" = 1 ] || { cat error; fail "an error of $(wc -l < error) lines: $*"; }
   diff expected error || fail "another error: $*"
@@ -114,12 +128,13 @@ one_line render "$fuel" -i 10 -o missing/picture.png
 [ ! -e none.png ] || fail 'a picture without a device'
 
 # Names of files.
-folder='with blanks'
+folder='with blanks, ä, 漢 and 🫖'
 mkdir "$folder"
 cp "$fuel" "$folder/a b_64x33x32_uint8.raw.gz"
-quietly "$build/run" "$there" convert "$folder/a b_64x33x32_uint8.raw.gz" -o "$folder/c d.zfp"
+quietly run_there "$there" convert "$folder/a b_64x33x32_uint8.raw.gz" -o "$folder/c d.zfp"
 quietly "$program" convert "$fuel" -o native.zfp
-cmp native.zfp "$folder/c d.zfp" || fail 'a file whose name has blanks is another'
+cmp native.zfp "$folder/c d.zfp" || fail 'a file whose name has blanks and other letters is another'
 one_line info "$folder/e f.zfp"
 [ "$(find "$folder" -name '.isowave*')" = '' ] || fail 'a temporary file is left'
+[ ! -e "$work/stuck" ] || cat "$work/stuck"
 echo "$system: $num_volumes volumes"

@@ -39,7 +39,7 @@ using testing::HasSubstr;
 constexpr const char *kFuelFile = ISOWAVE_TEST_DATA "/fuel_64x33x32_uint8.raw.gz";
 constexpr const char *kPlaces =
     "{@ISOWAVE_CONNECT@}<title>@ISOWAVE_TITLE@</title>[@ISOWAVE_POSTER@]<@ISOWAVE_SCENE@>"
-    "(@ISOWAVE_VOLUME@)end";
+    "(@ISOWAVE_VOLUME@)|@ISOWAVE_FIELD@|end";
 
 std::filesystem::path write_engine(const TemporaryFolder &folder, const std::string &text) {
   const std::filesystem::path path = folder / "engine.html.gz";
@@ -79,7 +79,7 @@ TEST(Page, HoldsTheVolumeTheSceneAndItsPicture) {
   save_page(volume, scene, folder / "page.html", options);
   const std::string page = read_file(folder / "page.html");
   EXPECT_EQ(between(page, "<title>", "</title>"), "a &#60;b&#62; &#38; c");
-  EXPECT_EQ(page.substr(page.size() - 4), ")end");
+  EXPECT_EQ(page.substr(page.size() - 6), ")||end") << "no second volume";
   EXPECT_EQ(page.substr(0, 2), "{}") << "asks no server";
 
   volume->save(folder / "volume.zfp");
@@ -93,6 +93,38 @@ TEST(Page, HoldsTheVolumeTheSceneAndItsPicture) {
   const std::vector<std::uint8_t> png = encode_png(renderer.render(request));
   EXPECT_EQ(decoded(between(page, "[", "]")), std::string(png.begin(), png.end()));
   EXPECT_EQ(folder.num_files(), 3u) << "a temporary file is left";
+}
+
+TEST(Page, HoldsTheSecondVolume) {
+  const TemporaryFolder folder;
+  const auto volume = public_volume();
+  const auto field = compress(std::vector<float>(64, 1.0f), Grid{.dims = {4, 4, 4}});
+  const PageOptions options{
+      .engine = write_engine(folder, kPlaces), .field = field, .poster = {64, 48}};
+  Scene scene{.surfaces = {{.isovalue = 10}}};
+  scene.field = folder / "heat.nrrd";
+  save_page(volume, scene, folder / "unused.html", options);
+  EXPECT_EQ(between(read_file(folder / "unused.html"), "|", "|"), "") << "no colours are by it";
+
+  scene.appearance.color_map = "viridis";
+  scene.appearance.color_by_field = true;
+  save_page(volume, scene, folder / "page.html", options);
+  const std::string page = read_file(folder / "page.html");
+  field->save(folder / "field.zfp");
+  EXPECT_EQ(decoded(between(page, "|", "|")), read_file(folder / "field.zfp"));
+  EXPECT_EQ(parse_scene(between(page, "]<", ">(")).field, "heat.nrrd") << "without its folder";
+  Renderer renderer = make_host_renderer(volume, {.field = field});
+  FrameRequest request = scene_request(scene);
+  request.size = {64, 48};
+  request.camera = renderer.camera(scene.surfaces, request.size);
+  const std::vector<std::uint8_t> png = encode_png(renderer.render(request));
+  EXPECT_EQ(decoded(between(page, "[", "]")), std::string(png.begin(), png.end()));
+
+  scene.field.clear();
+  save_page(volume, scene, folder / "page.html", options);
+  EXPECT_EQ(parse_scene(between(read_file(folder / "page.html"), "]<", ">(")).field, "field");
+  EXPECT_THAT(error_of([&] { save_site(volume, scene, folder / "site", options); }),
+              HasSubstr("a site has one volume"));
 }
 
 TEST(Page, TextsOfAnyLengthAreWhole) {
@@ -127,12 +159,11 @@ TEST(Page, RefusesWhatAPageDoesNotShow) {
     change(scene);
     return error_of([&] { save_page(public_volume(), scene, folder / "p.html", options); });
   };
-  EXPECT_THAT(refused([](Scene &s) { s.annotations.emplace(); }), HasSubstr("annotations"));
-  EXPECT_THAT(refused([](Scene &s) { s.field = "heat.zfp"; }), HasSubstr("a second volume"));
-  EXPECT_THAT(refused([](Scene &s) { s.appearance.color_by_field = true; }),
-              HasSubstr("colours by a second volume"));
-  EXPECT_THAT(refused([](Scene &s) { s.camera.emplace().parallel_height = 3; }),
-              HasSubstr("parallel"));
+  EXPECT_THAT(refused([](Scene &s) {
+                s.appearance.color_map = "viridis";
+                s.appearance.color_by_field = true;
+              }),
+              HasSubstr("a second volume (field), which was not opened"));
   EXPECT_THAT(refused([](Scene &s) { s.appearance.color_table.resize(256); }),
               HasSubstr("tables of colours"));
   EXPECT_THAT(refused([](Scene &s) { s.surfaces[0].clipped = false; }), HasSubstr("clipped"));
@@ -186,6 +217,16 @@ TEST_F(CliExport, OneIsovalueOrAScene) {
     EXPECT_EQ(scene_in("b.html").surfaces.at(0).opacity, 0.5f);
     EXPECT_THAT(read_file(folder_ / "b.html"), HasSubstr("<title>Fuel<"));
   }
+  // A second volume is opened, too.
+  const std::string text = R"({"isowave_scene": 1, "surfaces": [{"isovalue": 20}],
+    "color_map": "magma", "color_by_field": true, "field": ")" +
+                           std::string(kFuelFile) + R"("})";
+  write_file(folder_ / "f.json", text);
+  const auto of_field = run_isowave(fuel + " --scene " + in("f.json") + " -o " + in("f.html"));
+  ASSERT_EQ(of_field.status, 0) << of_field.err;
+  EXPECT_EQ(between(read_file(folder_ / "f.html"), "|", "|"),
+            between(read_file(folder_ / "f.html"), "(", ")"));
+  expect_one_line_error(fuel + " --scene " + in("f.json") + " --site " + in("f"), "one volume");
   // A volume that is compressed already is taken as it is.
   ASSERT_EQ(run_isowave(std::string("convert ") + kFuelFile + " -o " + in("v.zfp")).status, 0);
   ASSERT_EQ(run_isowave("export " + in("v.zfp") + engine() + " -o " + in("c.html")).status, 0);

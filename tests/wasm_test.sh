@@ -49,18 +49,24 @@ same_bits() { # same_bits VOLUME ISOVALUE
 }
 # A page's worker draws the picture, too: whole, and in bands of rows; with the browser's own
 # multiply-add, and with what takes its place.
-same_picture() { # same_picture VOLUME OPTION...
+same_picture() { # same_picture [--field FIELD.zfp] VOLUME OPTION...
+  local field=()
+  if [ "$1" = --field ]; then field=("$2") && shift 2; fi
   local volume=$source/tests/data/$1
   quietly "$program" render "$volume" "${@:2}" --size 96x54 --ambient 2 -o "$work/native.png" \
     --save-scene "$work/scene.json"
   for plain in '' plain; do
     quietly "${node[@]}" "$source/tests/page_engine.cjs" "$build/library/tools/page/engine.js" \
-      "$source/tools/page/worker.js" "$volume" "$work/scene.json" "$work/engine.png" $plain
-    cmp "$work/engine.png" "$work/native.png" || fail "$1: the engine's picture is another"
+      "$source/tools/page/worker.js" "$volume" "$work/scene.json" "$work/native.png" \
+      "${field[@]}" $plain
   done
 }
-same_picture fuel_64x33x32_uint8.raw.gz -i 10
-same_picture fuel_64x33x32_uint8.raw.gz --surface 10,skin,0.4 --surface 90,blood
+fuel=fuel_64x33x32_uint8.raw.gz
+same_picture $fuel -i 10
+same_picture $fuel --surface 10,skin,0.4 --surface 90,blood
+same_picture $fuel -i 10 --parallel
+quietly "$program" convert "$source/tests/data/head_41x41x41_uint8.raw.gz" -o "$work/head.zfp"
+same_picture --field "$work/head.zfp" $fuel -i 10 --color-by "$work/head.zfp,20,200"
 
 same_bits fuel_64x33x32_uint8.raw.gz 10
 same_bits head_41x41x41_uint8.raw.gz 90

@@ -300,7 +300,7 @@ std::vector<AnnotationGroup> layout(const Annotations &wanted, const FrameReques
                                     const std::optional<std::array<double, 2>> &color_range,
                                     const std::optional<std::array<double, 2>> &slice_range) {
   const ImageSize &size = request.size;
-  if (size.width < kLeastWidth || size.height < kLeastHeight)
+  if (!has_room_for_annotations(size))
     throw core::Error("{} x {} pixels are too few for annotations: draw at least {} x {}",
                       size.width, size.height, kLeastWidth, kLeastHeight);
   const Appearance &appearance = request.appearance;
@@ -320,6 +320,10 @@ std::vector<AnnotationGroup> layout(const Annotations &wanted, const FrameReques
 }
 
 }  // namespace
+
+bool has_room_for_annotations(const ImageSize &size) {
+  return size.width >= kLeastWidth && size.height >= kLeastHeight;
+}
 
 std::vector<AnnotationGroup> annotation_layout(
     const Annotations &wanted, const FrameRequest &request,

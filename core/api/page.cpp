@@ -108,21 +108,30 @@ void check_for_page(const Scene &scene) {
   };
   const Appearance &look = scene.appearance;
   const auto any = [&](auto is) { return std::ranges::any_of(scene.surfaces, is); };
-  refuse(scene.annotations.has_value(), "annotations");
-  refuse(scene.camera && scene.camera->parallel_height, "a parallel view (parallel_height)");
-  refuse(!scene.field.empty() && scene.field != "volume", "a second volume (field)");
-  refuse(look.color_by_field && scene.field.empty(), "colours by a second volume");
   refuse(!look.color_table.empty() || !look.slice_table.empty(), "tables of colours");
   refuse(any([](const Surface &each) { return !each.clipped; }), "surfaces with clipped: false");
   refuse(any([](const Surface &each) { return !each.mapped; }), "surfaces with mapped: false");
   refuse(scene.clip.size() > kMostPlanes, "more than eight clipping planes");
 }
 
+/// The second volume of a scene; null: it has none.
+///
+/// Throws  core::Error: it is missing
+std::shared_ptr<const Volume> second_volume(const Scene &scene, const PageOptions &options) {
+  if (scene.field == "volume" || !scene.appearance.color_by_field) return {};
+  if (!options.field)
+    throw core::Error("the scene's colours are by a second volume (field), which was not opened");
+  return options.field;
+}
+
 /// The picture of a page's scene, which gets a camera if it has none.
-std::vector<std::uint8_t> draw_poster(const std::shared_ptr<const Volume> &volume, Scene &scene,
+///
+/// field  null: the volume
+std::vector<std::uint8_t> draw_poster(const std::shared_ptr<const Volume> &volume,
+                                      const std::shared_ptr<const Volume> &field, Scene &scene,
                                       ImageSize size) {
-  Renderer renderer = make_host_renderer(
-      volume, {.field = scene.field.empty() ? nullptr : volume, .largest = size});
+  Renderer renderer =
+      make_host_renderer(volume, {.field = field ? field : volume, .largest = size});
   FrameRequest request = scene_request(scene);
   if (!scene.camera) scene.camera = request.camera = renderer.camera(scene.surfaces, size);
   request.size = size;
@@ -156,9 +165,9 @@ std::string to_json_of_page(const std::string &json) {
   return result;
 }
 
-constexpr std::array<std::string_view, 5> kPlaces = {"@ISOWAVE_CONNECT@", "@ISOWAVE_TITLE@",
-                                                     "@ISOWAVE_POSTER@", "@ISOWAVE_SCENE@",
-                                                     "@ISOWAVE_VOLUME@"};
+constexpr std::array<std::string_view, 6> kPlaces = {"@ISOWAVE_CONNECT@", "@ISOWAVE_TITLE@",
+                                                     "@ISOWAVE_POSTER@",  "@ISOWAVE_SCENE@",
+                                                     "@ISOWAVE_VOLUME@",  "@ISOWAVE_FIELD@"};
 /// The engine's text before, between and behind kPlaces.
 using EngineParts = std::array<std::string, kPlaces.size() + 1>;
 
@@ -181,10 +190,11 @@ EngineParts read_parts(const fs::path &wanted) {
 ///
 /// connect       what the page's policy allows beside what all pages need
 /// write_volume  writes what stands in the volume's place
-template <class WriteVolume>
+/// write_field   and in that of the second one
+template <class WriteVolume, class WriteField>
 void write_page(const Scene &scene, core::AtomicFile &file, const PageOptions &options,
                 std::span<const std::uint8_t> poster, std::string_view connect,
-                const WriteVolume &write_volume) {
+                const WriteVolume &write_volume, const WriteField &write_field) {
   const EngineParts parts = read_parts(options.engine);
   std::string title = options.title.empty() ? scene.volume.filename().string() : options.title;
   if (title.empty()) title = "Volume";
@@ -192,6 +202,10 @@ void write_page(const Scene &scene, core::AtomicFile &file, const PageOptions &o
   shown.volume.clear();
   shown.dataset.clear();
   shown.index.clear();
+  shown.field_dataset.clear();
+  shown.field_index.clear();
+  shown.field = scene.field.filename();
+  if (shown.field.empty() && shown.appearance.color_by_field) shown.field = "field";
 
   file.write(parts[0]);
   file.write(connect);
@@ -202,6 +216,26 @@ void write_page(const Scene &scene, core::AtomicFile &file, const PageOptions &o
   file.write(parts[3] + to_json_of_page(scene_text(shown)) + parts[4]);
   write_volume();
   file.write(parts[5]);
+  write_field();
+  file.write(parts[6]);
+}
+
+/// Writes a volume as base64 text of a .zfp file.
+void write_as_text(const Volume &volume, const fs::path &path, core::AtomicFile &file) {
+  Base64Text bytes(file);
+  core::give_zfp_file(volume.implementation().volume, path,
+                      [&](std::span<const std::byte> piece) { bytes.write(piece); });
+  bytes.finish();
+}
+
+/// Throws  core::Error: it is too large for a page
+void check_size(const Volume &volume, const char *what) {
+  const std::uint64_t mebibytes = volume.compressed_bytes() >> 20;
+  if (mebibytes > kMostMebibytes)
+    throw core::Error(
+        "{} has {} MiB, and a page holds {}: compress it with a larger tolerance, or at a lower "
+        "rate",
+        what, mebibytes, kMostMebibytes);
 }
 
 /// Writes a volume in chunks, with all levels of detail that it can have.
@@ -271,21 +305,17 @@ void save_page(const std::shared_ptr<const Volume> &volume, const Scene &scene,
   core::guarded("writing a page", [&] {
     if (!volume) throw core::Error("a page needs a volume");
     check_page(scene, path, options);
-    if (const std::uint64_t mebibytes = volume->compressed_bytes() >> 20;
-        mebibytes > kMostMebibytes)
-      throw core::Error(
-          "the volume has {} MiB, and a page holds {}: compress it with a larger tolerance, or at "
-          "a lower rate",
-          mebibytes, kMostMebibytes);
+    const std::shared_ptr<const Volume> field = second_volume(scene, options);
+    check_size(*volume, "the volume");
+    if (field) check_size(*field, "the second volume");
     Scene shown = scene;
-    const std::vector<std::uint8_t> poster = draw_poster(volume, shown, options.poster);
+    const std::vector<std::uint8_t> poster = draw_poster(volume, field, shown, options.poster);
     core::AtomicFile file(path);
-    write_page(scene, file, options, poster, {}, [&] {
-      Base64Text bytes(file);
-      core::give_zfp_file(volume->implementation().volume, path,
-                          [&](std::span<const std::byte> piece) { bytes.write(piece); });
-      bytes.finish();
-    });
+    write_page(
+        scene, file, options, poster, {}, [&] { write_as_text(*volume, path, file); },
+        [&] {
+          if (field) write_as_text(*field, path, file);
+        });
     file.commit();
   });
 }
@@ -297,6 +327,10 @@ std::array<fs::path, 2> site_files(const fs::path &folder) {
 void check_site(const Scene &scene, const PageOptions &options) {
   core::guarded("writing a site", [&] {
     check_for_page(scene);
+    if (scene.field != "volume" && scene.appearance.color_by_field)
+      throw core::Error(
+          "a site has one volume, and colours are by a second one (field): write a page, or leave "
+          "that out of the scene");
     read_parts(options.engine);
   });
 }
@@ -309,12 +343,13 @@ void save_site(const std::shared_ptr<const Volume> &volume, const Scene &scene,
     const auto [page, chunks] = site_files(folder);
     NewFolder new_folder(folder);
     Scene shown = scene;
-    const std::vector<std::uint8_t> poster = draw_poster(volume, shown, options.poster);
+    const std::vector<std::uint8_t> poster = draw_poster(volume, {}, shown, options.poster);
     core::AtomicFile chunks_file(chunks), page_file(page);
     const core::ChunkFileSize size =
         write_site_volume(volume->implementation().volume, chunks_file);
-    write_page(shown, page_file, options, poster, kSiteConnect,
-               [&] { page_file.write(text_of_site(*volume, size)); });
+    write_page(
+        shown, page_file, options, poster, kSiteConnect,
+        [&] { page_file.write(text_of_site(*volume, size)); }, [] {});
     chunks_file.commit();
     page_file.commit();
     new_folder.keep();

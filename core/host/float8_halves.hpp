@@ -17,6 +17,16 @@ struct HalfOf<std::int32_t> {
   using Type = HalfInts;
 };
 
+/// The number, of which compilers do not know that it is loaded: tools/page/fma_by_wasm.hpp says
+/// why.
+template <class Lane>
+inline Lane not_loaded(Lane x) {
+#ifdef __wasm__
+  if (!__builtin_constant_p(x)) asm("" : "+r"(x));
+#endif
+  return x;
+}
+
 /// Two halves, since compilers compare vectors of eight lane by lane where registers have four.
 template <class Lane>
 struct Eight {
@@ -26,7 +36,10 @@ struct Eight {
   Eight() = default;
   Eight(Four a, Four b) : low(a), high(b) {}
   // The same number in all lanes, as vectors take it in arithmetic.
-  Eight(Lane x) : low{x, x, x, x}, high{x, x, x, x} {}
+  Eight(Lane x) {
+    x = not_loaded(x);
+    low = high = Four{x, x, x, x};
+  }
   Eight(Lane a, Lane b, Lane c, Lane d, Lane e, Lane f, Lane g, Lane h)
       : low{a, b, c, d}, high{e, f, g, h} {}
 

@@ -61,6 +61,20 @@ Scene read_scene_of(const CLI::App &command, ExportArgs &options) {
   return scene;
 }
 
+/// The second volume; null: the scene's colours are by none.
+std::shared_ptr<const Volume> load_field(const Scene &scene,
+                                         const CompressionOptions &compression) {
+  const std::string field = scene.field.string();
+  if (!scene.appearance.color_by_field || field.empty() || field == "volume") return {};
+  VolumeOptions options;
+  scene_field(scene);  // or throws
+  options.index = scene.field_index;
+  return std::make_shared<Volume>(std::make_unique<Volume::Implementation>(
+      load_volume(field, to_overrides(options),
+                  is_zfp_name(field) ? CompressionOptions{} : compression),
+      std::vector<std::string>{}));
+}
+
 /// Looks at the outputs before any work, and sets the page's name if there is none.
 void check_outputs(const CLI::App &command, ExportArgs &options, const Scene &scene) {
   Outputs outputs;
@@ -107,6 +121,7 @@ void run_export(const CLI::App &command, ExportArgs options) {
     if (surface.labels.empty()) warn_of_isovalue(compressed, surface.isovalue);
   }
   if (options.site.empty()) {
+    options.page.field = load_field(scene, options.compression);
     save_page(volume, scene, options.output, options.page);
     tell_of(options.output, names_output ? "; --output names another file" : "");
     return;

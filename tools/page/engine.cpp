@@ -7,13 +7,16 @@
 //   open    path, keep: keep the .zfp file's bytes -> facts of the volume, as the viewer's
 //   "welcome"
 //           has them; bytes of a .zfp file if it was none. chunks: path has the head of a file of
-//           chunks, and this is the file's size
+//           chunks, and this is the file's size. field: path of a second volume -> its range and
+//           type, too
 //   supply  path, parts [[begin, end], ...] of that file, whose bytes path has one behind the other
 //   scene   text -> fields: the scene's, without those that have their defaults
 //   camera  scene, size [width, height] -> camera, which the surfaces fill
-//   draw    scene, size, samples, ambient, rows [begin, end]; png -> what was drawn; bytes: RGBA of
-//           these rows, or a PNG file of the whole picture
-//   probe   scene, size, at [x, y], 0 to 1 -> position, value: what is seen there, or null
+//   draw    scene, size, samples, ambient, rows [begin, end] -> what was drawn; bytes: RGBA of
+//           these rows. annotated: size of the picture that gets the scene's annotations -> them,
+//           as JSON; none if that size is too small for them
+//   probe   scene, size, at [x, y], 0 to 1 -> position; value and field's there: what is seen, or
+//           null
 //   histogram  -> counts, range, suggested isovalues
 //
 // An answer may be {"missing": [[begin, end], ...]} instead: parts of the file of chunks without
@@ -62,26 +65,36 @@ std::vector<std::byte> read_file(const std::string &path) {
   return bytes;
 }
 
+/// The volume without its file.
+core::CompressedVolume read_whole(const Volume &volume) {
+  core::CompressedVolume whole = volume.implementation().volume;
+  if (!whole.chunks) whole.coarser_levels.clear();  // the finest draws all
+  if (whole.file) {
+    whole.words.resize(whole.word_count());
+    whole.read_words(0, whole.words);
+    whole.file.reset();
+    whole.file_first_bit = 0;
+  }
+  return whole;
+}
+
 /// A volume, and what draws it.
 struct Opened {
-  explicit Opened(std::shared_ptr<const Volume> of) : volume(std::move(of)) {
-    in_memory = volume->implementation().volume;
-    if (!in_memory.chunks) in_memory.coarser_levels.clear();  // the finest draws all
-    if (in_memory.file) {
-      in_memory.words.resize(in_memory.word_count());
-      in_memory.read_words(0, in_memory.words);
-      in_memory.file.reset();
-      in_memory.file_first_bit = 0;
-    }
-    const std::uint64_t limit =
-        core::HostLevels::least_bytes(in_memory, ISO_MAX_SURFACES, true) + kDecodedBytes;
+  /// second  a field that colours surfaces; null: the volume itself
+  Opened(std::shared_ptr<const Volume> of, std::shared_ptr<const Volume> second)
+      : volume(std::move(of)), field(std::move(second)), in_memory(read_whole(*volume)) {
+    if (field) field_in_memory = read_whole(*field);
+    const std::uint64_t of_field = field ? core::HostBlocks::bytes(field_in_memory.info) : 0,
+                        limit = core::HostLevels::least_bytes(in_memory, ISO_MAX_SURFACES, true) +
+                                of_field + kDecodedBytes;
     auto on_host = std::make_unique<core::HostRenderer>(
-        in_memory,
-        core::HostRendererOptions{.memory_limit = limit, .num_threads = 1, .field = &in_memory});
+        in_memory, core::HostRendererOptions{.memory_limit = limit,
+                                             .num_threads = 1,
+                                             .field = field ? &field_in_memory : &in_memory});
     host = on_host.get();
     auto implementation = std::make_unique<Renderer::Implementation>(std::make_shared<Turns>(),
                                                                      volume, std::move(on_host));
-    implementation->field = volume;
+    implementation->field = field ? field : volume;
     renderer.emplace(std::move(implementation));
   }
   Opened(const Opened &) = delete;
@@ -105,8 +118,8 @@ struct Opened {
     return parts;
   }
 
-  std::shared_ptr<const Volume> volume;
-  core::CompressedVolume in_memory;  ///< which rays read from
+  std::shared_ptr<const Volume> volume, field;
+  core::CompressedVolume in_memory, field_in_memory{};  ///< which rays read from
   core::HostRenderer *host = nullptr;
   std::optional<Renderer> renderer;
   /// A request that waits for chunks, and what was drawn for it.
@@ -155,18 +168,26 @@ std::array<float, 2> range_of(const Opened &on) {
   return {std::ranges::min(ranges.low), std::ranges::max(ranges.high)};
 }
 
-json facts() {
+const char *type_of(const Volume &volume) {
   constexpr std::array kTypes = {"uint8", "int8",    "uint16",  "int16",  "uint32",
                                  "int32", "float32", "float64", "uint64", "int64"};
+  return kTypes.at(std::size_t(volume.source_type()));
+}
+
+json facts() {
   const Volume &volume = *opened->volume;
   const Grid &grid = volume.grid();
+  json of_field;
+  if (const auto &field = opened->field)
+    of_field = {{"range", range_or_sampled(*field)}, {"dtype", type_of(*field)}};
   return {{"shape", {grid.dims[2], grid.dims[1], grid.dims[0]}},
           {"spacing", {grid.spacing[2], grid.spacing[1], grid.spacing[0]}},
           {"box", box_of(grid)},
           {"anatomical", grid.is_anatomical},
-          {"dtype", kTypes.at(std::size_t(volume.source_type()))},
+          {"dtype", type_of(volume)},
           {"range", range_of(*opened)},
           {"levels", opened->in_memory.coarser_levels.size() + 1},
+          {"second", of_field},
           {"bits_per_voxel", volume.bits_per_voxel()},
           {"max_error", volume.max_voxel_error() ? json(*volume.max_voxel_error()) : json()},
           {"nbytes", volume.compressed_bytes()},
@@ -181,7 +202,9 @@ json open(const json &request) {
           ? open_volume(path)
           : std::make_shared<const Volume>(std::make_unique<const Volume::Implementation>(
                 core::read_chunks_head(read_file(path), *found), std::vector<std::string>{}));
-  auto next = std::make_unique<Opened>(std::move(volume));  // or throws, and the one before stays
+  const std::string of_field = request.value("field", "");
+  auto next = std::make_unique<Opened>(  // or throws, and the one before stays
+      std::move(volume), of_field.empty() ? nullptr : open_volume(of_field));
   if (request.value("keep", false))
     core::give_zfp_file(next->volume->implementation().volume, "volume.zfp",
                         [](std::span<const std::byte> piece) {
@@ -239,6 +262,89 @@ FrameRequest frame_request(const json &request) {
   return frame;
 }
 
+/// Writes arrays of arrays as JSON.
+class ListText {
+ public:
+  void begin() { text_ += '['; }
+  void end() {
+    if (text_.back() == ',') text_.pop_back();
+    text_ += "],";
+  }
+  void add(double number) { text_ += json(number).dump() + ','; }
+  void add(const std::string &text) { text_ += json(text).dump() + ','; }
+  template <class T, std::size_t kSize>
+  void add(const std::array<T, kSize> &numbers) {
+    begin();
+    for (const T number : numbers) add(static_cast<double>(number));
+    end();
+  }
+  std::string take() {
+    text_.pop_back();
+    return std::move(text_);
+  }
+
+ private:
+  std::string text_;
+};
+
+void add_group(const AnnotationGroup &group, ListText &text) {
+  text.begin();
+  text.add(group.begin);
+  text.add(group.end);
+  text.begin();
+  for (const AnnotationBox &box : group.boxes) {
+    text.begin();
+    text.add(box.begin);
+    text.add(box.end);
+    text.add(box.color);
+    text.end();
+  }
+  text.end();
+  text.begin();
+  for (const AnnotationStroke &stroke : group.strokes) {
+    text.begin();
+    text.begin();
+    for (const PicturePlace &point : stroke.points) text.add(point);
+    text.end();
+    text.add(stroke.width);
+    text.add(stroke.color);
+    text.end();
+  }
+  text.end();
+  text.begin();
+  for (const AnnotationText &words : group.texts) {
+    text.begin();
+    text.add(words.place);
+    text.add(words.anchor);
+    text.add(words.size);
+    text.add(words.text);
+    text.add(words.color);
+    text.end();
+  }
+  text.end();
+  text.add(group.halo);
+  text.add(group.halo_color);
+  text.end();
+}
+
+/// The annotations of a request's scene, as JSON: for each group, the values of its fields in
+/// order. None: the picture is too small.
+std::string annotations_of(const json &request, FrameRequest frame,
+                           const FrameStatistics &statistics) {
+  const std::optional<Annotations> wanted = parse_scene(request.at("scene").dump()).annotations;
+  const auto &size = request.at("annotated");
+  frame.size = {size.at(0), size.at(1), 1};
+  ListText text;
+  text.begin();
+  if (wanted && has_room_for_annotations(frame.size)) {
+    for (const AnnotationGroup &group :
+         annotation_layout(*wanted, frame, statistics.color_range, statistics.slice_range))
+      add_group(group, text);
+  }
+  text.end();
+  return text.take();
+}
+
 /// Draws what is not finished of a request. Returns nothing if chunks are missing.
 std::optional<Frame> render_or_wait(Opened &on, std::string request, const FrameRequest &wanted) {
   const bool goes_on = request == on.waiting;
@@ -260,26 +366,21 @@ std::optional<Frame> render_or_wait(Opened &on, std::string request, const Frame
 json draw(const json &request) {
   Opened &on = the_volume();
   const FrameRequest wanted = frame_request(request);
-  const bool as_png = request.value("png", false);
   std::array<std::uint32_t, 2> rows{0, wanted.size.height};
-  if (const auto found = request.find("rows"); found != request.end() && !as_png) rows = *found;
+  if (const auto found = request.find("rows"); found != request.end()) rows = *found;
   on.host->set_rows(rows[0], rows[1]);
   const std::optional<Frame> drawn = render_or_wait(on, request.dump(), wanted);
   if (!drawn) return {};
   const Frame &frame = *drawn;
-  if (as_png) {
-    bytes = encode_png(frame);
-  } else {
-    const std::size_t pixels = std::size_t{wanted.size.width} * (rows[1] - rows[0]),
-                      channels = wanted.appearance.transparent ? 4 : 3;
-    bytes.resize(4 * pixels);
-    const std::uint8_t *from =
-        frame.picture.data() + channels * std::size_t{wanted.size.width} * rows[0];
-    for (std::uint8_t *to = bytes.data(); to != bytes.data() + bytes.size(); to += 4) {
-      std::copy_n(from, channels, to);
-      if (channels == 3) to[3] = 255;
-      from += channels;
-    }
+  const std::size_t pixels = std::size_t{wanted.size.width} * (rows[1] - rows[0]),
+                    channels = wanted.appearance.transparent ? 4 : 3;
+  bytes.resize(4 * pixels);
+  const std::uint8_t *from =
+      frame.picture.data() + channels * std::size_t{wanted.size.width} * rows[0];
+  for (std::uint8_t *to = bytes.data(); to != bytes.data() + bytes.size(); to += 4) {
+    std::copy_n(from, channels, to);
+    if (channels == 3) to[3] = 255;
+    from += channels;
   }
   const FrameStatistics &statistics = frame.statistics;
   std::string notice;
@@ -294,6 +395,8 @@ json draw(const json &request) {
                  {"ms", statistics.total_ms},
                  {"notice", notice}};
   if (statistics.field_range) answer["field_range"] = *statistics.field_range;
+  if (request.contains("annotated"))
+    answer["annotations"] = annotations_of(request, wanted, statistics);
   return answer;
 }
 
@@ -336,18 +439,21 @@ json probe(const json &request) {
   const auto pixel = [](double at, std::uint32_t count) {
     return std::min(std::floor(at * count), count - 1.0) + 0.5;
   };
-  const Camera &camera = frame.camera;
+  Camera &camera = frame.camera;
   const auto vector = [](const Vector3 &v) { return glm::dvec3(v[0], v[1], v[2]); };
   const glm::dvec3 eye = vector(camera.eye), forward = glm::normalize(vector(camera.at) - eye),
                    right = glm::normalize(glm::cross(forward, vector(camera.up)));
-  const double half = std::tan(glm::radians(camera.fovy_degrees) / 2),
+  const double half = camera.parallel_height ? *camera.parallel_height / 2
+                                             : std::tan(glm::radians(camera.fovy_degrees) / 2),
                u = (2 * pixel(request.at("at").at(0), size.width) / size.width - 1) * half *
                    size.width / size.height,
                v = (1 - 2 * pixel(request.at("at").at(1), size.height) / size.height) * half;
-  const glm::dvec3 ray = glm::normalize(forward + u * right + v * glm::cross(right, forward)),
-                   at = eye + ray;
-  frame.camera.at = {at.x, at.y, at.z};
-  frame.camera.fovy_degrees = 0.01;
+  const glm::dvec3 aside = u * right + v * glm::cross(right, forward),
+                   from = camera.parallel_height ? eye + aside : eye,
+                   at = from + (camera.parallel_height ? forward : glm::normalize(forward + aside));
+  camera.eye = {from.x, from.y, from.z};
+  camera.at = {at.x, at.y, at.z};
+  camera.fovy_degrees = 0.01;
   frame.size = {1, 1, 1};
   frame.ambient_rays = frame.appearance.shadow_rays = frame.appearance.bounce_rays = 0;
   frame.want_positions = true;
@@ -357,9 +463,15 @@ json probe(const json &request) {
   const Frame drawn = on.renderer->render(frame);
   if (drawn.statistics.cancelled) return {};
   const Vector3 position = drawn.positions[0];
-  if (!std::isfinite(position[0])) return {{"position", nullptr}, {"value", nullptr}};
-  const std::optional<double> value = value_at(*on.volume, position);
-  return {{"position", position}, {"value", value ? json(*value) : json()}};
+  if (!std::isfinite(position[0]))
+    return {{"position", nullptr}, {"value", nullptr}, {"field", nullptr}};
+  const auto value_in = [&](const Volume *of) {
+    const std::optional<double> value = of == nullptr ? std::nullopt : value_at(*of, position);
+    return value ? json(*value) : json();
+  };
+  return {{"position", position},
+          {"value", value_in(on.volume.get())},
+          {"field", value_in(on.field.get())}};
 }
 
 json histogram() {

@@ -14,7 +14,7 @@ const MOST_BYTES = 2e9; // of all workers' engines, about
 const ENGINE_BYTES = 192e6; // of one, beside what the volume takes
 /** What a page's engine does not have: elements of the panel and the menus. */
 const NOT_HERE = ["[name=max_error]", "[name=by]", "[name=time_budget]", ".levels",
-  "[name=with_bar]", "[name=save_page]", ".budget", "details:has([name=units])"];
+  "[name=save_page]", ".budget"];
 const OF_FIELDS = ["[name=colour_by][value=field]"]; // if the scene has no second volume
 
 /** Bytes of base64 text, piece by piece. */
@@ -108,17 +108,21 @@ class Crew {
 
   /** Opens a volume: in one worker, which says what it is; the others get it meanwhile.
    * @param {?RemoteVolume} remote the volume; bytes are the head of its file
+   * @param {?Uint8Array} field the .zfp file of a second volume
    * @returns {Promise<Message>} facts of the volume, as in welcome */
-  async open(name, bytes, remote = null) {
+  async open(name, bytes, remote = null, field = null) {
     if (this.workers.length === 0) await this.add();
     const keep = !remote && !/\.zfp$/i.test(name);
     const chunks = remote?.bytes; // of the whole file
-    const { data, ...facts } = await this.askFirst({ what: "open", name, bytes, keep, chunks });
+    const { data, ...facts } = await this.askFirst(
+      { what: "open", name, bytes, keep, chunks, field });
     this.remote = remote;
     for (const worker of this.workers.slice(1)) this.end(worker, "The volume is another one.");
     this.ready = [...this.workers];
-    const file = { what: "open", name: "volume.zfp", bytes: data ?? bytes, keep: false, chunks };
-    const each = ENGINE_BYTES + facts.memory + (remote ? 0 : 2 * facts.nbytes);
+    const file = { what: "open", name: "volume.zfp", bytes: data ?? bytes, keep: false, chunks,
+      field };
+    const each = ENGINE_BYTES + facts.memory
+      + 2 * ((remote ? 0 : facts.nbytes) + (field?.length ?? 0));
     this.count = clamp(Math.floor(MOST_BYTES / each), 1,
       Math.min(navigator.hardwareConcurrency || 2, MOST_WORKERS));
     for (let i = 1; i < this.count; ++i) this.join(file);
@@ -147,8 +151,7 @@ function sceneOf(wish) {
   const { surfaces, isovalue, color, camera, color_map: map, slice_map: slices } = wish;
   return {
     isowave_scene: 1,
-    ...(camera && { camera: { eye: camera.eye, at: camera.at, up: camera.up,
-      fovy_degrees: camera.fovy_deg } }),
+    ...(camera && { camera: sceneCamera(camera) }),
     surfaces: surfaces.length ? surfaces : [{ isovalue, color, opacity: 1 }],
     clip: wish.clip,
     caps: wish.caps,
@@ -167,6 +170,7 @@ function sceneOf(wish) {
     ...(wish.light && { light_direction: wish.light }),
     ...(wish.shadow && { shadow_rays: wish.shadow.rays, light_angle: wish.shadow.angle }),
     ...(wish.bounce && { bounce_rays: wish.bounce }),
+    ...(wish.annotations && { annotations: sceneAnnotations(wish.annotations) }),
   };
 }
 
@@ -228,8 +232,11 @@ class LocalScene {
 
   get welcome() {
     const { isovalue } = this.first?.surfaces[0] ?? { isovalue: this.facts.isovalue };
-    const field = this.first?.field === "volume" || this.first?.color_by_label
-      ? { name: "volume", range: this.facts.range, labels: /int/.test(this.facts.dtype) } : null;
+    const { second } = this.facts;
+    const hasField = second || this.first?.field === "volume" || this.first?.color_by_label;
+    const { range, dtype } = second ?? this.facts;
+    const field = hasField ? { name: second ? this.first.field : "volume", range,
+      labels: /int/.test(dtype) } : null;
     return { ...this.facts, type: "welcome", version: VERSION, title: this.title, isovalue,
       scene: this.first && this.fitted(this.first), annotations: null, field, steps: null };
   }
@@ -285,7 +292,7 @@ class LocalScene {
       if (!picture) return; // there is a newer wish
       const { bounce, ambient, shadow } = stage;
       this.hear({ type: "picture", wish: wish.id, step: 0, frame: ++this.frames,
-        stage: stage.stage, format: "rgba", size: stage.size, samples: stage.samples, bounce,
+        stage: stage.stage, format: "rgba", size: picture.size, samples: stage.samples, bounce,
         ambient, shadow: shadow?.rays ?? 0, camera: seen.camera, isovalue: wish.isovalue,
         complete: stage.stage === "lossless", detail: null, reduced: null, percent: 100,
         ms: performance.now() - begin, passes: 1, ...picture.facts }, picture.pixels);
@@ -300,10 +307,12 @@ class LocalScene {
   async drawStage(stage) {
     const [width, height] = stage.size;
     const workers = [...this.crew.ready];
-    const pixels = new Uint8ClampedArray(4 * width * height);
+    const { size: annotated } = this.last; // in smaller pictures, texts could not be read
+    let pixels = new Uint8ClampedArray(4 * width * height);
+    let groups = [];
     const facts = { decoded_blocks: 0, rays_cut: 0, notice: "", field_range: null };
-    const request = { what: "draw", scene: sceneOf(stage), size: stage.size,
-      samples: stage.samples, ambient: stage.ambient, voxel_pixels: stage.voxel_pixels ?? 0 };
+    const request = { ...this.requestOf(stage), annotated,
+      voxel_pixels: stage.voxel_pixels ?? 0 };
     const band = this.bandOf(stage, workers.length);
     let row = 0;
     let failure = null;
@@ -316,6 +325,7 @@ class LocalScene {
         if (!answer) return;
         const { data, took, ...of } = answer;
         pixels.set(data, 4 * width * rows[0]);
+        groups = JSON.parse(of.annotations);
         facts.decoded_blocks += of.decoded_blocks;
         facts.rays_cut += of.rays_cut;
         facts.notice = of.notice;
@@ -327,7 +337,19 @@ class LocalScene {
     };
     await Promise.all(workers.map((worker) => draw(worker).catch((error) => { failure = error; })));
     if (failure) throw failure;
-    return this.next && stage.stage !== "first" ? null : { pixels, facts };
+    if (this.next && stage.stage !== "first") return null;
+    if (groups.length) {
+      if (width !== annotated[0]) pixels = resized(pixels, stage.size, annotated);
+      annotate(pixels, annotated[0], groups);
+    }
+    return { pixels, size: groups.length ? annotated : stage.size, facts };
+  }
+
+  /** What the engine is asked for a picture. */
+  requestOf({ size, samples, ambient, annotations, ...wish }) {
+    const titled = annotations && { ...annotations, title: annotations.title || this.title };
+    return { what: "draw", scene: sceneOf({ ...wish, annotations: titled }), size, samples,
+      ambient };
   }
 
   /** Rows of a band. */
@@ -345,9 +367,9 @@ class LocalScene {
     const nothing = { type: "probe", id, position: null, value: null, field: null };
     try {
       const { size, ...wish } = this.last;
-      const { position, value } = await this.crew.askFirst({ what: "probe",
+      const { position, value, field } = await this.crew.askFirst({ what: "probe",
         scene: sceneOf(wish), size, at });
-      this.hear({ ...nothing, position, value });
+      this.hear({ ...nothing, position, value, field });
     } catch {
       this.hear(nothing); // pictures tell of it
     }
@@ -376,10 +398,13 @@ class LocalScene {
     const say = (head, data) => !isOver && hear(head, data);
     const draw = async (wish) => {
       try {
-        const { data } = await this.crew.askFirst({ what: "draw",
-          scene: sceneOf(wish), size: wish.size, samples: wish.samples, ambient: wish.ambient,
-          png: true });
-        say({ type: "picture", wish: wish.id, frame: 1, stage: "lossless", format: "png" }, data);
+        const { size, transparent, camera } = wish;
+        const { data, annotations } = await this.crew.askFirst(
+          { ...this.requestOf(wish), annotated: size });
+        const pixels = new Uint8ClampedArray(data.buffer);
+        annotate(pixels, size[0], JSON.parse(annotations));
+        say({ type: "picture", wish: wish.id, frame: 1, stage: "lossless", format: "png" },
+          await toPng(pixels, size, transparent, writeCamera(camera, ...size)));
       } catch ({ message }) {
         say({ type: "error", wish: wish.id, message });
       }
@@ -442,9 +467,10 @@ async function startPage() {
     return say(`The engine of this page does not start: ${error.message}`);
   }
   const of = text("volume").trim();
+  const field = text("field").trim();
   try {
     const facts = of.startsWith("{") ? await openBeside(crew, JSON.parse(of))
-      : await crew.open("volume.zfp", fromBase64(of));
+      : await crew.open("volume.zfp", fromBase64(of), null, field ? fromBase64(field) : null);
     const { fields } = await crew.askFirst({ what: "scene", text: text("scene") });
     showView(crew, facts, title, fieldsOf(fields));
   } catch (error) {
@@ -482,7 +508,7 @@ function showView(crew, facts, title, scene) {
   const [, picture] = poster.querySelector("img").src.split(",");
   view.showStill(fromBase64(picture));
   poster.remove();
-  document.getElementById("volume").remove(); // the engines have it
+  for (const id of ["volume", "field"]) document.getElementById(id).remove(); // engines have them
   view.connected();
 }
 

@@ -3,7 +3,8 @@
 
 The page has the viewer's front end (folder VIEWER), the engine, and places for what isowave's
 save_page() puts in: @ISOWAVE_CONNECT@, @ISOWAVE_TITLE@, @ISOWAVE_POSTER@, @ISOWAVE_SCENE@,
-@ISOWAVE_VOLUME@. If advdef is installed (apt install advancecomp), the engine becomes 5 % smaller.
+@ISOWAVE_VOLUME@, @ISOWAVE_FIELD@. If advdef is installed (apt install advancecomp), the engine
+becomes 5 % smaller.
 """
 
 import base64
@@ -18,7 +19,7 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 HOMES = "homes.js"  # of servers and notebooks; these come in its place:
-OWN = ("relaxed.js", "remote.js", "local.js")
+OWN = ("relaxed.js", "remote.js", "drawn_annotations.js", "png.js", "local.js")
 
 
 def script(viewer: Path) -> str:

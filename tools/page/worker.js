@@ -26,12 +26,15 @@ function remove(path) {
 
 let shown = null; // path of the volume, whose blocks are read from it
 
-function open({ name, bytes, keep, chunks }) {
+function open({ name, bytes, keep, chunks, field }) {
   const folder = `/${++folders}`;
   engine.FS.mkdir(folder);
   const path = `${folder}/${name.replaceAll("/", "_")}`;
   engine.FS.writeFile(path, new Uint8Array(bytes));
-  const answer = ask({ what: "open", path, keep, chunks });
+  const second = field ? "/field.zfp" : ""; // which is read at once
+  if (field) engine.FS.writeFile(second, field);
+  const answer = ask({ what: "open", path, keep, chunks, field: second });
+  if (field) engine.FS.unlink(second);
   remove(answer.error ? path : shown);
   if (!answer.error) shown = path;
   if (answer.error) answer.error = answer.error.replaceAll(path, name);

@@ -462,12 +462,15 @@ void add_renderers(nb::module_ &m) {
   m.def(
       "save_page",
       [](const PyVolume &volume, const nb::dict &fields, const std::filesystem::path &path,
-         const std::filesystem::path &engine, const std::string &title) {
+         const std::filesystem::path &engine, const std::string &title, const PyVolume *field) {
         const isowave::Scene scene = scene_of(fields);
         const WithoutGil no_gil;
-        isowave::save_page(volume.volume, scene, path, {.engine = engine, .title = title});
+        isowave::save_page(volume.volume, scene, path,
+                           {.engine = engine,
+                            .title = title,
+                            .field = field == nullptr ? nullptr : field->volume});
       },
-      "volume"_a, "scene"_a, "path"_a, "engine"_a, "title"_a);
+      "volume"_a, "scene"_a, "path"_a, "engine"_a, "title"_a, "field"_a.none());
   m.def(
       "save_site",
       [](const PyVolume &volume, const nb::dict &fields, const std::filesystem::path &folder,

@@ -76,13 +76,15 @@ struct AnnotationGroup {
   std::array<float, 3> halo_color{};
 };
 
+/// Whether annotation_layout() takes pictures of that size: from 200 x 150 pixels on.
+bool has_room_for_annotations(const ImageSize &size);
 /// The annotations of a picture: scale bar, axes, colour bar, caption, as far as they are wanted.
 ///
 /// request      its camera, size, isovalues, colours and background
 /// color_range  FrameStatistics::color_range of the frame
 /// slice_range  FrameStatistics::slice_range of the frame
-/// Throws       Error: the picture has less than 200 x 150 pixels; a colour bar is wanted without a
-///              colour map and slices
+/// Throws       Error: the picture is too small; a colour bar is wanted without a colour map and
+///              slices
 std::vector<AnnotationGroup> annotation_layout(
     const Annotations &wanted, const FrameRequest &request,
     const std::optional<std::array<double, 2>> &color_range,

@@ -19,19 +19,22 @@ struct PageOptions {
   /// built or installed with the program that calls this.
   std::filesystem::path engine{};
   std::string title{};  ///< of the page; empty: the name of the scene's volume
+  /// The second volume, unless Scene::field is `volume` or colours are not by a field.
+  std::shared_ptr<const Volume> field{};
   /// Size of the picture that is seen until the engine has drawn one, and without JavaScript.
   ImageSize poster{1280, 720};
 };
 
 /// Writes a page: one HTML file that holds the engine, the volume, the scene and a picture. It
 /// draws what the library draws, with the same bits, in the browser, and asks no server. Readers
-/// can turn the scene and change it. The compressed volume takes 4/3 of its bytes.
+/// can turn the scene and change it. Each compressed volume takes 4/3 of its bytes.
 ///
-/// scene   its volume is not opened. Without a camera, the surfaces fill the picture
+/// scene   its volumes are not opened. Without a camera, the surfaces fill the picture. The page
+///         draws the annotations, and the picture has none
 /// path    ends in .html; the file appears when it is complete
-/// Throws  Error: no engine; a scene with what pages do not show: annotations, a parallel view, a
-///         second volume, tables of colours, surfaces that are not clipped or mapped, more than
-///         eight clipping planes; a volume of more than 350 MiB; the file cannot be written
+/// Throws  Error: no engine; a scene with what pages do not show: tables of colours, surfaces that
+///         are not clipped or mapped, more than eight clipping planes; colours by a second volume
+///         that is missing; a volume of more than 350 MiB; the file cannot be written
 void save_page(const std::shared_ptr<const Volume> &volume, const Scene &scene,
                const std::filesystem::path &path, const PageOptions &options = {});
 /// Throws  Error: what save_page() refuses, whatever the volume is

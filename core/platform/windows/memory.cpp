@@ -7,7 +7,7 @@
 #include <iterator>
 #include <map>
 #include <mutex>
-#include <shared_mutex>
+#include <shared_mutex>  // std::shared_lock
 
 #include "core/platform/windows/system.hpp"
 
@@ -17,9 +17,21 @@ namespace {
 
 constexpr std::uintptr_t kPageBytes = 1u << 16;  ///< Windows reserves addresses by as many
 
+/// A std::shared_mutex by Windows. With that of winpthreads, more programs under Wine never ended.
+class SharedMutex {
+ public:
+  void lock() { ::AcquireSRWLockExclusive(&lock_); }
+  void unlock() { ::ReleaseSRWLockExclusive(&lock_); }
+  void lock_shared() { ::AcquireSRWLockShared(&lock_); }
+  void unlock_shared() { ::ReleaseSRWLockShared(&lock_); }
+
+ private:
+  SRWLOCK lock_ = SRWLOCK_INIT;
+};
+
 /// Where pages have been taken: begin and end.
 struct Taken {
-  std::shared_mutex mutex;
+  SharedMutex mutex;
   std::map<std::uintptr_t, std::uintptr_t> ranges;
 };
 

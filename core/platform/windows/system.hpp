@@ -42,7 +42,7 @@ class Handle {
 /// Other processes may read, write, rename and remove what is open, as on other systems.
 inline constexpr DWORD kShareAll = FILE_SHARE_READ | FILE_SHARE_WRITE | FILE_SHARE_DELETE;
 
-/// Paths hold UTF-16, and std::string UTF-8: libstdc++ converts one to the other.
+/// Paths hold UTF-16, and std::string UTF-8: libstdc++ converts one to the other (process.cpp).
 inline std::string utf8_of(const wchar_t *text) {
   return std::filesystem::path(text).string();
 }

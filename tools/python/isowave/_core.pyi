@@ -37,6 +37,7 @@ def save_page(
     path: str | PathLike[str],
     engine: str | PathLike[str],
     title: str,
+    field: Volume | None,
 ) -> None: ...
 def save_site(
     volume: Volume,

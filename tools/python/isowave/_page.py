@@ -11,10 +11,17 @@ ENGINE = _loader.PACKAGE / "page.html.gz"  # of a wheel that has one
 
 
 def save_page(
-    volume: Any, fields: dict[str, Any], path: str | os.PathLike[str], title: str
+    volume: Any, fields: dict[str, Any], path: str | os.PathLike[str], title: str, field: Any
 ) -> None:
-    """Writes a page. fields: those of isowave::Scene. Raises TypeError, Error."""
-    _core.save_page(_core_of(volume), fields, os.fsdecode(path), _engine(), title)
+    """Writes a page.
+
+    fields  of isowave::Scene
+    field   the second volume if colours are by one; otherwise it is not looked at
+    Raises  TypeError, Error
+    """
+    is_used = fields.get("color_by_field") and fields.get("field") != "volume"
+    second = _core_of(field) if is_used and field is not None else None
+    _core.save_page(_core_of(volume), fields, os.fsdecode(path), _engine(), title, second)
 
 
 def save_site(

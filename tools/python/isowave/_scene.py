@@ -191,12 +191,11 @@ class Scene:
         Raises
         ------
         Error
-            No surface; what a page does not show: annotations, a field, tables of colours,
-            surfaces with clipped or mapped False, more than eight clipping planes; a volume of
-            more than 350 MiB; a package without the engine for browsers; a file that cannot be
-            written.
+            No surface; what a page does not show: tables of colours, surfaces with clipped or
+            mapped False, more than eight clipping planes; a volume of more than 350 MiB; a package
+            without the engine for browsers; a file that cannot be written.
         """
-        save_page(self.volume, scene_fields(self), path, title)
+        save_page(self.volume, scene_fields(self), path, title, self.field)
 
     def save_site(self, folder: str | os.PathLike[str], *, title: str = "") -> None:
         """Writes a folder for a server of static files: index.html and, beside it, the volume.
@@ -215,7 +214,7 @@ class Scene:
         Raises
         ------
         Error
-            As save_html(), but for the size.
+            As save_html(), but for the size; colours by a second volume.
         """
         save_site(self.volume, scene_fields(self), folder, title)
 

@@ -167,9 +167,11 @@ class Volume(Voxels):
         """Writes such a page for a server, with a volume of any size: see Scene.save_site()."""
         self.scene().surface(isovalue).save_site(folder, title=title)
 
-    def save_page(self, fields: dict[str, Any], path: str | os.PathLike[str], title: str) -> None:
-        """The same of a scene's fields; for the viewer."""
-        save_page(self, fields, path, title)
+    def save_page(
+        self, fields: dict[str, Any], path: str | os.PathLike[str], title: str, field: Any
+    ) -> None:
+        """The same of a scene's fields, and of the second volume; for the viewer."""
+        save_page(self, fields, path, title, field)
 
     @takes(Renderer.render, size=DEFAULT_SIZE)
     def render(

@@ -15,6 +15,7 @@ import os
 import re
 import subprocess
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,8 @@ from viewer_fakes import FakeVolume
 from viewer_scenes import Clock, make_scene
 
 import isowave
+from isowave import _core
+from isowave._annotate import annotations_for_core
 from isowave._page import ENGINE
 from isowave.viewer.protocol import PageFile
 
@@ -106,7 +109,7 @@ def opened(open_page: Callable[..., Any], path: Path, **options: Any) -> Any:
     return page
 
 
-def drawn_by_program(page: Any, volume: Path, folder: Path) -> Any:
+def drawn_by_program(page: Any, volume: Path, folder: Path, *more: str) -> Any:
     """The program's picture of what the page shows: by the command that the page tells."""
     menu(page, "export")
     command = page.locator("[name=command]").input_value()
@@ -114,7 +117,7 @@ def drawn_by_program(page: Any, volume: Path, folder: Path) -> Any:
     (folder / "scene.json").write_text(json.dumps(scene))
     options = re.search(r"(--size .*) -o ", command)[1].split()  # type: ignore[index]
     subprocess.run(
-        [PROGRAM, "render", volume, "--scene", "scene.json", *options, "-o", "a.png"],
+        [PROGRAM, "render", volume, "--scene", "scene.json", *options, *more, "-o", "a.png"],
         cwd=folder,
         check=True,
         stdout=subprocess.DEVNULL,
@@ -178,11 +181,110 @@ def test_scenes_are_drawn_and_controls_without_an_engine_hidden(
     page = opened(open_page, tmp_path / "s.html")
     assert page.locator(".surfaces li").count() == 2
     assert np.array_equal(shown(page), drawn_by_program(page, FUEL, tmp_path))
-    for name in ("max_error", "time_budget", "budget", "units"):
+    for name in ("max_error", "time_budget", "budget"):
         assert not page.locator(f"[name={name}]").is_visible(), name
-    for name in ("samples", "ambient"):
+    for name in ("samples", "ambient", "units"):
         assert page.locator(f"[name={name}]").is_visible(), name
     keep(page, "page_of_a_scene")
+
+
+def outside(groups: list[dict[str, Any]], picture: Any) -> Any:
+    """Where annotations change nothing."""
+    mask = np.ones(picture.shape[:2], bool)
+    for group in groups:
+        (left, top), (right, bottom) = group["begin"], group["end"]
+        mask[top:bottom, left:right] = False
+    return mask
+
+
+def test_annotations_are_where_the_library_has_them(
+    open_page: Callable[..., Any], volume: isowave.Volume, tmp_path: Path
+) -> None:
+    what = ["scale-bar", "axes", "color-bar", "caption"]
+    scene = volume.scene().surface(10).look(color_map="viridis")
+    scene.annotate(what, units="mm", title="A title").save_html(tmp_path / "a.html")
+    page = opened(open_page, tmp_path / "a.html")
+    assert page.locator("[name=axes]").is_checked()
+    assert page.locator("[name=units]").input_value() == "mm"
+    picture, plain = shown(page), drawn_by_program(page, FUEL, tmp_path, "--annotate", "none")
+    # The program's, by Cairo, are about the same: fonts and edges differ.
+    by_cairo = drawn_by_program(page, FUEL, tmp_path)
+    height, width = picture.shape[:2]
+    file = isowave.open_scene(tmp_path / "scene.json", volume=volume)
+    image = file.render(size=(width, height), device="host")
+    wanted = isowave.Annotations(what, "mm", "A title")
+    layout = _core.annotation_layout(
+        annotations_for_core(wanted, True), image._fields, image.statistics["color_range"], None
+    )
+    assert len(layout) == 4
+    mask = outside(layout, picture)
+    assert np.array_equal(picture[mask], plain[mask])
+    assert np.array_equal(plain[mask], by_cairo[mask])
+    for group in layout:
+        (left, top), (right, bottom) = group["begin"], group["end"]
+        ours, cairos, none = (
+            p[top:bottom, left:right].astype(int) for p in (picture, by_cairo, plain)
+        )
+        changed = np.abs(cairos - none).sum()
+        assert np.abs(ours - none).sum() > 0.7 * changed
+        assert np.abs(ours - cairos).sum() < 0.8 * changed
+    keep(page, "page_with_annotations")
+    # Small first pictures are enlarged for them, and a file has them, too.
+    page.evaluate("window.shownPictures.length = 0")
+    page.locator("[name=caption]").uncheck()
+    rests(page)
+    assert not np.array_equal(shown(page), picture)
+    if not FIREFOX:
+        menu(page, "export")
+        with page.expect_download() as saved:
+            page.locator("[name=shot]").click()
+        assert np.array_equal(np.asarray(Image.open(saved.value.path())), shown(page))
+    assert page.problems == []
+
+
+def test_a_parallel_view_turns_zooms_and_stays_parallel(
+    open_page: Callable[..., Any], volume: isowave.Volume, tmp_path: Path
+) -> None:
+    camera = replace(volume.camera(10), parallel_height=40.0)
+    volume.scene().surface(10).seen_from(camera).save_html(tmp_path / "p.html")
+    page = opened(open_page, tmp_path / "p.html")
+    seen = shown(page)
+    assert float(state(page)["parallel"]) == pytest.approx(40, rel=0.5)  # as the page is wide
+    assert np.array_equal(seen, drawn_by_program(page, FUEL, tmp_path))
+    before = state(page)
+    page.locator(".picture").focus()
+    page.keyboard.press("+")
+    page.keyboard.press("ArrowLeft")
+    rests(page)
+    after = state(page)
+    assert float(after["parallel"]) < float(before["parallel"]) and after["eye"] != before["eye"]
+    assert np.array_equal(shown(page), drawn_by_program(page, FUEL, tmp_path))
+    box = page.locator(".picture").bounding_box()
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    until(page, f"{ROOT}.querySelector('.readout').textContent")
+    text = page.locator(".readout").text_content()
+    assert float(text.split(" · ")[-1]) == pytest.approx(10, abs=0.01)
+
+
+def test_colours_by_a_second_volume(
+    open_page: Callable[..., Any], volume: isowave.Volume, tmp_path: Path
+) -> None:
+    z, y, x = np.indices((9, 9, 16), np.float32)
+    heat = isowave.compress(x + 2 * y + 3 * z, spacing=(4, 4, 4))
+    heat.save(tmp_path / "heat.zfp")
+    field = isowave.open(tmp_path / "heat.zfp")
+    by_field = isowave.ColorMap("magma", by="field")
+    scene = volume.scene().surface(10).look(color_map=by_field, field=field)
+    scene.save_html(tmp_path / "f.html")
+    page = opened(open_page, tmp_path / "f.html")
+    assert np.array_equal(shown(page), drawn_by_program(page, FUEL, tmp_path))
+    box = page.locator(".picture").bounding_box()
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    until(page, f"{ROOT}.querySelector('.readout').textContent")
+    keep(page, "page_with_a_field")
+    assert page.problems == []
+    with pytest.raises(isowave.Error, match="a site has one volume"):
+        scene.save_site(tmp_path / "site")
 
 
 def test_a_saved_picture_is_the_one_that_is_shown(
@@ -196,6 +298,9 @@ def test_a_saved_picture_is_the_one_that_is_shown(
         page.locator("[name=shot]").click()
     assert saved.value.suggested_filename.endswith("_10.png")
     assert np.array_equal(np.asarray(Image.open(saved.value.path())), shown(page))
+    camera = json.loads(Image.open(saved.value.path()).text["isowave cameras"])
+    eye = [float(x) for x in state(page)["eye"].split(",")]
+    assert camera["cameras"][0]["eye"] == pytest.approx(eye)
 
 
 def test_what_is_under_the_cursor(open_page: Callable[..., Any], html: Path) -> None:
@@ -289,9 +394,9 @@ def test_a_phones_page(open_page: Callable[..., Any], html: Path) -> None:
 def test_wrong_pages_are_one_line(volume: isowave.Volume, tmp_path: Path) -> None:
     with pytest.raises(isowave.Error, match="HTML"):
         volume.save_html(tmp_path / "a.png", 10)
-    scene = volume.scene().surface(10)
-    with pytest.raises(isowave.Error, match="annotations"):
-        scene.annotate("axes").save_html(tmp_path / "a.html")
+    scene = volume.scene().surface(10, clipped=False)
+    with pytest.raises(isowave.Error, match="clipped"):
+        scene.save_html(tmp_path / "a.html")
     other: Any = isowave.Scene(object(), (isowave.Surface(10),))  # type: ignore[arg-type]
     with pytest.raises(TypeError, match="a page shows a Volume"):
         other.save_html(tmp_path / "a.html")
@@ -301,7 +406,7 @@ def test_wrong_pages_are_one_line(volume: isowave.Volume, tmp_path: Path) -> Non
 def test_the_engine_is_small_and_evaluates_no_texts() -> None:
     file = Path(os.environ.get("ISOWAVE_PAGE", ENGINE))
     page = gzip.decompress(file.read_bytes()).decode()
-    for place in ("TITLE", "POSTER", "SCENE", "VOLUME"):
+    for place in ("TITLE", "POSTER", "SCENE", "VOLUME", "FIELD"):
         assert page.count(f"@ISOWAVE_{place}@") == 1
     policy = re.search(r'Content-Security-Policy" content="([^"]*)"', page)[1]  # type: ignore
     assert "default-src 'none'" in policy and "unsafe-eval" not in policy.replace(

@@ -177,6 +177,6 @@ def test_python_writes_such_a_folder(tmp_path: Path) -> None:
     volume.save_site(tmp_path / "site", 40, title="Ramp")
     assert {each.name for each in (tmp_path / "site").iterdir()} == {"index.html", "volume.chunks"}
     assert "<title>Ramp</title>" in (tmp_path / "site/index.html").read_text()
-    with pytest.raises(isowave.Error, match="annotations"):
-        volume.scene().surface(10).annotate("axes").save_site(tmp_path / "other")
+    with pytest.raises(isowave.Error, match="clipped"):
+        volume.scene().surface(10, clipped=False).save_site(tmp_path / "other")
     assert not (tmp_path / "other").exists()

@@ -74,6 +74,8 @@ def test_messages_are_read() -> None:
     }
     asked = Request(80, camera, (64, 48), 2, **colors, **clip, **more)
     assert check(parse(json.dumps(WISH))) == Wish(7, asked)
+    high = check({**WISH, "camera": {**CAMERA, "parallel_height": 7}})
+    assert high == Wish(7, replace(asked, camera=replace(camera, parallel_height=7.0)))
     timed = check({**WISH, "max_error": None, "time_budget": 50})
     assert isinstance(timed, Wish) and timed.request.time_budget_ms == 50
     assert timed.request.by == "proof"  # there is no error to judge
@@ -283,6 +285,8 @@ BAD_WISHES: list[tuple[dict[str, Any], str]] = [
     ({"camera": {**CAMERA, "up": [0, 0, 0]}}, "parallel"),
     ({"camera": {**CAMERA, "eye": [1e19, 0, 0]}}, "eye"),
     ({"camera": {**CAMERA, "fovy_deg": 180}}, "fovy_deg"),
+    ({"camera": {**CAMERA, "parallel_height": 0}}, "parallel_height must be a number"),
+    ({"camera": {**CAMERA, "parallel_height": "5"}}, "parallel_height must be a number"),
     ({"camera": {**CAMERA, "fovy_deg": 0}}, "fovy_deg"),
     ({"more": 1}, "other keys"),
     ({"type": "dance"}, "no known type"),

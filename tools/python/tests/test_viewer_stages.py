@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -208,6 +209,8 @@ def test_positions_and_values_are_those_of_the_volume() -> None:
     position = hits.position((0.8, 0.4))
     ray = np.array([2 * 6.5 / 8 - 1, 0, 0]) * 2 + [0, 1 - 2 * 1.5 / 4, -1]
     assert position == pytest.approx(np.array([1, 2, 3]) + 5 * ray / np.linalg.norm(ray))
+    parallel = Hits(depth, replace(camera, parallel_height=2.0), 0).position((0.8, 0.4))
+    assert parallel == pytest.approx(np.array([1, 2, 3]) + [ray[0], ray[1], -5])
 
     class Sheared(FakeVolume):
         def __getitem__(self, key: Any) -> Any:

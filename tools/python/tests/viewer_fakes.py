@@ -134,7 +134,7 @@ class FakeVolume:
         least, largest = self.value_range
         return "" if least < isovalue <= largest else f"isovalue {isovalue:g} is outside."
 
-    def save_page(self, fields: dict[str, Any], path: Any, title: str) -> None:
+    def save_page(self, fields: dict[str, Any], path: Any, title: str, field: Any) -> None:
         isovalues = [surface["isovalue"] for surface in fields["surfaces"]]
         Path(path).write_text(f"<!doctype html><title>{title}</title>{isovalues}")
 

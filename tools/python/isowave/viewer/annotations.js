@@ -55,14 +55,15 @@ function readAnnotations(parts) {
 
 const annotationKey = (name) => name.replace("-", "_"); // a name in scene files
 
+/** What a wish says of annotations, as a scene file has it. */
+const sceneAnnotations = ({ what, units, title }) => ({
+  ...Object.fromEntries(what.map((name) => [annotationKey(name), true])),
+  ...(units && { units }), ...(title && { title }) });
+
 /** Fields of a scene file. */
 function writeSceneAnnotations(state) {
   const { annotations } = wishedAnnotations(state);
-  if (!annotations) return {};
-  const { what, units, title } = annotations;
-  return { annotations: {
-    ...Object.fromEntries(what.map((name) => [annotationKey(name), true])),
-    ...(units && { units }), ...(title && { title }) } };
+  return annotations ? { annotations: sceneAnnotations(annotations) } : {};
 }
 
 /**

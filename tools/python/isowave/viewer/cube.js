@@ -75,8 +75,7 @@ class Cube {
     // One in the picture is enough.
     scaleBar.hidden = !camera || !(height > 0) || what.includes("scale-bar");
     if (scaleBar.hidden) return;
-    const distance = length(sub(camera.at, camera.eye));
-    const pixel = (2 * distance * Math.tan((camera.fovy_deg * Math.PI) / 360)) / height;
+    const pixel = heightAt(camera, length(sub(camera.at, camera.eye))) / height;
     const bar = roundLength(pixel * width * BAR_SHARE);
     scaleBar.querySelector("i").style.width = `${bar / pixel}px`;
     scaleBar.querySelector("span").textContent = `${toText(bar)} ${view.unit}`.trim();

@@ -18,8 +18,9 @@ from .interfaces import VolumeLike
 class Hits:
     """The first hits of a picture's rays.
 
-    depth   distance from the eye [world units], by rows and columns of rays; inf: no surface
-    camera  the picture's, a pinhole
+    depth   distance from the eye, or from the eye's plane in parallel projection [world units],
+            by rows and columns of rays; inf: no surface
+    camera  the picture's
     step    of the series
     """
 
@@ -38,11 +39,19 @@ class Hits:
         eye = np.array(camera.eye, np.float64)
         forward = _unit(np.array(camera.at) - eye)
         right = _unit(np.cross(forward, camera.up))
-        half = math.tan(math.radians(camera.fovy) / 2)
+        half = (
+            math.tan(math.radians(camera.fovy) / 2)
+            if camera.parallel_height is None
+            else camera.parallel_height / 2
+        )
         u = (2 * (column + 0.5) / columns - 1) * half * columns / rows
         v = (1 - 2 * (row + 0.5) / rows) * half
-        ray = _unit(forward + u * right + v * np.cross(right, forward))
-        position: NDArray[np.float64] = eye + distance * ray
+        aside = u * right + v * np.cross(right, forward)
+        position: NDArray[np.float64] = (
+            eye + distance * _unit(forward + aside)
+            if camera.parallel_height is None
+            else eye + aside + distance * forward
+        )
         return position
 
 

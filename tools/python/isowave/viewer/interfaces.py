@@ -147,7 +147,9 @@ class VolumeLike(Protocol):
     def renderer(self, **options: Unpack[RendererArguments]) -> RendererLike:
         ...
 
-    def save_page(self, fields: dict[str, Any], path: str | os.PathLike[str], title: str) -> None:
+    def save_page(
+        self, fields: dict[str, Any], path: str | os.PathLike[str], title: str, field: Any
+    ) -> None:
         ...
 
 

@@ -151,7 +151,7 @@ def progress(frame: Frame) -> dict[str, Any]:
 
 def picture(frame: Frame, stage: str, seconds: float) -> dict[str, Any]:
     """The head of a picture, which goes before its bytes."""
-    camera = frame.camera
+    camera, high = frame.camera, frame.camera.parallel_height
     return {
         "type": "picture",
         "wish": frame.wish.id,
@@ -172,6 +172,7 @@ def picture(frame: Frame, stage: str, seconds: float) -> dict[str, Any]:
             "at": list(camera.at),
             "up": list(camera.up),
             "fovy_deg": camera.fovy,
+            **({"parallel_height": high} if high is not None else {}),
         },
         "complete": False,
         "ms": round(seconds * 1e3, 2),

@@ -56,18 +56,26 @@ export function opposite(camera, top) {
   return { ...camera, eye: sub(camera.at, back), up: isAlong ? scale(camera.up, -1) : camera.up };
 }
 
+/** The picture's height at a distance from the eye. */
+const heightAt = (camera, distance) => camera.parallel_height
+  ?? 2 * distance * Math.tan((camera.fovy_deg * Math.PI) / 360);
+
 /** Eye and at move so that the surface follows by dx, dy [picture heights; y down]. */
 export function pan(camera, dx, dy) {
   const forward = sub(camera.at, camera.eye);
-  const height = 2 * length(forward) * Math.tan((camera.fovy_deg * Math.PI) / 360);
+  const height = heightAt(camera, length(forward));
   const right = unit(cross(forward, camera.up));
   const up = cross(right, unit(forward));
   const move = add(scale(right, -dx * height), scale(up, dy * height));
   return { ...camera, eye: add(camera.eye, move), at: add(camera.at, move) };
 }
 
-/** The eye's distance from `at` is multiplied by a factor. */
+/** The eye's distance from `at` is multiplied by a factor; in parallel projection the picture's
+ * height is. */
 export function zoom(camera, factor) {
+  if (camera.parallel_height) {
+    return { ...camera, parallel_height: camera.parallel_height * factor };
+  }
   const away = scale(sub(camera.eye, camera.at), factor);
   return length(away) > 0 ? { ...camera, eye: add(camera.at, away) } : camera;
 }
@@ -78,7 +86,7 @@ export function zoom(camera, factor) {
  */
 export function zoomTo(camera, factor, x, y) {
   const forward = sub(camera.at, camera.eye);
-  const height = 2 * length(forward) * Math.tan((camera.fovy_deg * Math.PI) / 360);
+  const height = heightAt(camera, length(forward));
   const right = unit(cross(forward, camera.up));
   const move = scale(add(scale(right, x), scale(cross(right, unit(forward)), y)),
     height * (1 - factor));
@@ -93,7 +101,8 @@ export function roll(camera, angle) {
 
 /** The camera looks at a point from the same side, closer by a factor. */
 export function lookAt(camera, point, factor = 1) {
-  return { ...camera, at: point, eye: add(point, scale(sub(camera.eye, camera.at), factor)) };
+  const back = sub(camera.eye, camera.at);
+  return zoom({ ...camera, at: point, eye: add(point, back) }, factor);
 }
 
 /**

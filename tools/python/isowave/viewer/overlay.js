@@ -15,12 +15,12 @@ export function projector(camera, width, height) {
   const forward = unit(sub(camera.at, camera.eye));
   const right = unit(cross(forward, camera.up));
   const up = cross(right, forward);
-  const focus = height / 2 / Math.tan((camera.fovy_deg * Math.PI) / 360);
   return (point) => {
     const to = sub(point, camera.eye);
     const depth = dot(to, forward);
-    return depth > 0 ? [width / 2 + (focus * dot(to, right)) / depth,
-      height / 2 - (focus * dot(to, up)) / depth, depth] : null;
+    const pixels = height / heightAt(camera, depth); // of a unit of the world
+    return depth > 0 ? [width / 2 + pixels * dot(to, right), height / 2 - pixels * dot(to, up),
+      depth] : null;
   };
 }
 
@@ -104,7 +104,8 @@ class Overlay {
     const [px, py] = this.project(add(point, scale(direction, step))) ?? [x, y];
     const [ax, ay] = [(px - x) / step, (py - y) / step]; // pixels of a unit of the world
     const square = ax * ax + ay * ay;
-    const focus = this.view.picture.clientHeight / depth;
+    const focus = this.view.picture.clientHeight
+      / (this.view.state.camera.parallel_height ?? depth);
     // Towards the eye: up is away.
     return (dx, dy) => move(square > (0.05 * focus) ** 2 ? (dx * ax + dy * ay) / square
       : -dy / focus);
@@ -167,8 +168,8 @@ class Overlay {
     const forward = unit(sub(camera.at, camera.eye));
     const right = unit(cross(forward, camera.up));
     const up = cross(right, forward);
-    const pixel = (2 * dot(sub(point, camera.eye), forward)
-      * Math.tan((camera.fovy_deg * Math.PI) / 360)) / this.view.picture.clientHeight;
+    const depth = dot(sub(point, camera.eye), forward);
+    const pixel = heightAt(camera, depth) / this.view.picture.clientHeight;
     return (dx, dy) => add(scale(right, dx * pixel), scale(up, -dy * pixel));
   }
 

@@ -6,7 +6,8 @@ these messages is an error: unknown and missing keys, NaN, numbers out of range,
 looks nowhere.
 
     {"type": "hello", "version": 1}
-    {"type": "wish", "id": 7, "isovalue": 80, "size": [1280, 720], "camera": {...} | null,
+    {"type": "wish", "id": 7, "isovalue": 80, "size": [1280, 720],
+     "camera": {"eye": [x, y, z], "at": [x, y, z], "up": [x, y, z], "fovy_deg": 60} | null,
      "color": [r, g, b], "background": [r, g, b], "background_top": [r, g, b] | null,
      "samples": 1, "max_error": 0.5 | null,
      "by": "proof" | "sample" | "picture", "time_budget": 100 | null, "voxel_pixels": 0,
@@ -29,9 +30,9 @@ looks nowhere.
     {"type": "scene", "text": "a scene file's"}
     {"type": "page", "text": "a scene file's"}
 
-max_error is in pixels of the surface, by proof or by sample; or, by picture, FLIP of the picture,
-and then samples are the most rays of a pixel that may be chosen. voxel_pixels is that of a Request,
-and comes without max_error and labels.
+A camera in parallel projection has "parallel_height", too. max_error is in pixels of the surface,
+by proof or by sample; or, by picture, FLIP of the picture, and then samples are the most rays of a
+pixel that may be chosen. voxel_pixels is that of a Request, and comes without max_error and labels.
 
 Without surfaces, one opaque surface is drawn, of the wish's isovalue and color. Surfaces come in
 place of these. Surfaces and slices come without time_budget and max_error by picture, labels
@@ -252,8 +253,11 @@ def _optional_triple(
 def _camera(value: object) -> Camera | None:
     if value is None:
         return None
-    if not isinstance(value, dict) or value.keys() != {"eye", "at", "up", "fovy_deg"}:
-        raise ProtocolError("camera must have eye, at, up and fovy_deg, and nothing else")
+    needed = {"eye", "at", "up", "fovy_deg"}
+    if not isinstance(value, dict) or value.keys() - {"parallel_height"} != needed:
+        raise ProtocolError(
+            "camera must have eye, at, up, fovy_deg, perhaps parallel_height, and nothing else"
+        )
     eye, at, up = (_triple(value[k], -MAX_LENGTH, MAX_LENGTH, k) for k in ("eye", "at", "up"))
     fovy = _number(value["fovy_deg"], 1e-3, 179.999, "fovy_deg")
     forward = tuple(a - e for a, e in zip(at, eye))
@@ -263,7 +267,10 @@ def _camera(value: object) -> Camera | None:
     cosine = sum(f / length * (u / height if height else 0) for f, u in zip(forward, up))
     if height == 0 or abs(cosine) > 1 - 1e-12:
         raise ProtocolError("camera: up is parallel to the view, or zero")
-    return Camera(eye, at, up, fovy)
+    high = value.get("parallel_height")
+    if high is not None:
+        high = _number(high, 1 / MAX_LENGTH, MAX_LENGTH, "parallel_height")
+    return Camera(eye, at, up, fovy, high)
 
 
 def _plane(value: object) -> ClipPlane:

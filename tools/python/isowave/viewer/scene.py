@@ -195,7 +195,7 @@ class Scene:
             elif isinstance(message, SceneFile):
                 client.post(messages.scene(message.text), None)
             elif isinstance(message, PageFile):
-                make = page_maker(self._steps, self._title, message.text)
+                make = page_maker(self._steps, self._title, message.text, self._field)
                 self._do(lambda: client.post(*make()))
             elif isinstance(message, Probe) and client.asks(message):
                 self._do(lambda: self._answer(client))

@@ -33,8 +33,7 @@ export function writeScene(state, background, { box, field, sources }) {
     isowave_scene: 1,
     ...partsOf("volume", sources?.[sources.length > 1 ? state.step : 0]),
     ...(isByField(map) && partsOf("field", ofField)),
-    ...(camera && { camera: { eye: camera.eye, at: camera.at, up: camera.up,
-      fovy_degrees: camera.fovy_deg } }),
+    ...(camera && { camera: sceneCamera(camera) }),
     surfaces: drawnSurfaces(state).map(({ labels, isovalue, color, opacity }) =>
       ({ ...(labels ? { labels } : { isovalue }), color, opacity })),
     clip: [...clipPlanes(state.clip, box), ...state.planes],
@@ -94,9 +93,6 @@ export function readScene(fields, field, hasLabels, box = null) {
   }
   const view = camera && { up: [0, 1, 0], fovy_deg: 60, ...camera };
   if (view?.fovy_degrees) view.fovy_deg = view.fovy_degrees;
-  if (typeof view?.parallel_height === "number") {
-    throw new Error('This page draws in perspective alone: leave out "parallel_height".');
-  }
   if (ofLabels.length && !hasLabels) {
     throw new Error(`The volume has no labels, which are integers from 0 to ${MAX_LABEL}.`);
   }

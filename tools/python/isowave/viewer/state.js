@@ -2,7 +2,8 @@
 // The first part of an ES module (front_end.py).
 
 /** @typedef {[number, number, number]} Vec */
-/** @typedef {{eye: Vec, at: Vec, up: Vec, fovy_deg: number}} Camera world space */
+/** @typedef {{eye: Vec, at: Vec, up: Vec, fovy_deg: number, parallel_height?: number}} Camera
+ *    world space. parallel_height: of the picture in parallel projection */
 /** @typedef {{surfaces: Surface[], selected: number, camera: ?Camera,
  *    background: ?string, background_top: ?string, samples: number, max_error: ?number, by: string,
  *    time_budget: ?number, voxel_pixels: ?number, ambient: number, clip: number[], caps: boolean,
@@ -54,9 +55,16 @@ function checkCamera(camera) {
   }
   const cosine = length(camera.up) > 0 ? dot(unit(forward), unit(camera.up)) : 1;
   if (Math.abs(cosine) > 1 - 1e-12) throw new Error('"up" is parallel to the view, or zero.');
-  const { eye, at, up, fovy_deg } = camera;
-  return { eye, at, up, fovy_deg };
+  const { eye, at, up, fovy_deg, parallel_height: high } = camera;
+  if (typeof high !== "number") return { eye, at, up, fovy_deg };
+  if (!(high >= 1e-18 && high <= 1e18)) {
+    throw new Error('"parallel_height" must be a height from 1e-18 to 1e18.');
+  }
+  return { eye, at, up, fovy_deg, parallel_height: high };
 }
+
+/** A camera as scene files have it. */
+const sceneCamera = ({ fovy_deg, ...camera }) => ({ ...camera, fovy_degrees: fovy_deg });
 
 /**
  * The first camera of a camera file.
@@ -75,16 +83,13 @@ export function readCamera(text) {
   if (typeof first !== "object" || first === null) {
     throw new Error('This is no camera: "cameras" with "eye", "at" and "up" is missing.');
   }
-  if (first.parallel_height !== undefined) {
-    throw new Error('This page draws in perspective alone: leave out "parallel_height".');
-  }
   return checkCamera({ up: [0, 1, 0], ...first, fovy_deg: file.fovy_deg ?? 60 });
 }
 
 /** A camera file of one camera. */
 export function writeCamera(camera, width, height) {
-  const { eye, at, up, fovy_deg } = camera;
-  return JSON.stringify({ width, height, fovy_deg, cameras: [{ eye, at, up }] });
+  const { fovy_deg, ...one } = camera;
+  return JSON.stringify({ width, height, fovy_deg, cameras: [one] });
 }
 
 /** The state as a URL's hash; what is not set is left out. */
@@ -103,6 +108,7 @@ export function writeHash(state) {
   if (camera) {
     for (const key of ["eye", "at", "up"]) parts[key] = camera[key].map(short).join(",");
     parts.fovy = short(camera.fovy_deg);
+    if (camera.parallel_height) parts.parallel = short(camera.parallel_height);
   }
   return "#" + Object.entries(parts).map(([k, v]) => `${k}=${v}`).join("&");
 }
@@ -144,7 +150,8 @@ export function readHash(hash, before) {
   if (parts.has("eye")) {
     try {
       const [eye, at, up] = ["eye", "at", "up"].map(vector);
-      state.camera = checkCamera({ eye, at, up, fovy_deg: number("fovy", 0.001, 179.999) });
+      state.camera = checkCamera({ eye, at, up, fovy_deg: number("fovy", 0.001, 179.999),
+        parallel_height: number("parallel", 1e-18, 1e18) });
     } catch {
       // A camera that cannot be used: the view stays as it is.
     }

@@ -159,8 +159,10 @@ class Tools {
       if (view.state.camera !== shown) return; // somebody else moved it
       const t = clamp((now - began) / FLY_MS, 0, 1);
       const s = t * t * (3 - 2 * t);
+      const high = to.parallel_height; // then `from` has one, too
       view.move(() => (t === 1 ? to : { ...to, eye: between(from.eye, to.eye, s),
-        at: between(from.at, to.at, s) }));
+        at: between(from.at, to.at, s),
+        ...(high && { parallel_height: from.parallel_height * (1 - s) + high * s }) }));
       shown = view.state.camera;
       if (t < 1) this.flying = requestAnimationFrame(step);
     };
