@@ -17,8 +17,7 @@ struct HalfOf<std::int32_t> {
   using Type = HalfInts;
 };
 
-/// The number, of which compilers do not know that it is loaded: tools/page/fma_by_wasm.hpp says
-/// why.
+/// The number, as one that was not loaded just now: kernels_cl/portable/fma_by_wasm.h says why.
 template <class Lane>
 inline Lane not_loaded(Lane x) {
 #ifdef __wasm__
