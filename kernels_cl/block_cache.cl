@@ -391,20 +391,25 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_to
 /// The cache as it was made: every slot free.
 ///
 /// blocks_x, blocks_y  of the grid in which ids of blocks count
-/// Launch              grid-stride over slots
-kernel void cache_clear(uint num_slots, uint blocks_x, uint blocks_y, global uint *table,
-                        global uint *slot_block_ids, global uint *slot_stamps,
+/// directory_words     0, or the length of the directory if it has not been written yet
+/// Launch              grid-stride over slots, and the directory
+kernel void cache_clear(uint num_slots, uint blocks_x, uint blocks_y, uint directory_words,
+                        global uint *table, global uint *slot_block_ids, global uint *slot_stamps,
                         global uint *free_slots, global CacheState *cache) {
+  global uint *directory = table + directory_begin(num_slots);
+  const uint none = empty_page(num_slots);
   if (get_global_id(0) == 0) {
     cache->free_count = num_slots;
     cache->granted = cache->recycled = 0;
+    for (uint i = 0; i < 8; ++i) table[8 * none + i] = ISO_BLOCK_ABSENT;
   }
+  for (uint i = get_global_id(0); i < directory_words; i += get_global_size(0)) directory[i] = none;
   for (uint slot = get_global_id(0); slot < num_slots; slot += get_global_size(0)) {
-    const uint block_id = slot_block_ids[slot], x = block_id % blocks_x,
-               y = block_id / blocks_x % blocks_y, layer = block_id / blocks_x / blocks_y;
+    const uint block_id = directory_words == 0 ? slot_block_ids[slot] : ISO_INVALID_ID;
     if (block_id != ISO_INVALID_ID)
-      table[directory_begin(num_slots) + group_of_block(blocks_x, blocks_y, x, y, layer)] =
-          empty_page(num_slots);
+      directory[group_of_block(blocks_x, blocks_y, block_id % blocks_x,
+                               block_id / blocks_x % blocks_y, block_id / blocks_x / blocks_y)] =
+          none;
     for (uint i = 0; i < 8; ++i) table[8 * slot + i] = ISO_BLOCK_ABSENT; /* page number `slot` */
     table[page_count_at(num_slots, slot)] = 0;
     slot_block_ids[slot] = ISO_INVALID_ID;

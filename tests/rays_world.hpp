@@ -11,6 +11,7 @@
 #include "core/render/block_store.hpp"
 #include "core/stages/march.hpp"
 #include "core/stages/request_ahead.hpp"
+#include "core/stages/start_and_march.hpp"
 #include "core/stages/start_rays.hpp"
 #include "kernels_cl/portable/ray_state.h"
 #include "tests/cache_table.hpp"

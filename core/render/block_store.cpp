@@ -155,6 +155,7 @@ void BlockStore::select(Level &level, FrameParams &frame, bool has_box) {
 void BlockStore::classify(Wavefront &rays, const Surface &surface) {
   const bool has_groups = levels[0].stream.has_groups();
   const std::pair of(surface.isovalue, has_groups ? surface.isovalue_index : 0);
+  has_drawn_surface = cached_surface_ == of;
   if (cached_surface_.value_or(of) != of) {
     const auto stage = device.timer().stage("macrocells");
     cache.classify(rays);

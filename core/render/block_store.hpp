@@ -153,6 +153,8 @@ class BlockStore {
   LevelRange drawing{};  ///< the frame at work
   /// Parameters of the levels that draw the frame at work.
   ocl::InFlight<std::vector<FrameParams>> level_frames{device};
+  /// The frame at work draws the surface of the last one, so that most blocks may be cached.
+  bool has_drawn_surface = false;
   bool counts_touched = false;  ///< passes count the blocks that they touch, see BlockCache
 
  private:

@@ -287,6 +287,13 @@ void DeviceRenderer::compile_kernels() {
       if (behind_ && wave == &*behind_) layers_->swap_hits(rays, 0);
     }
   }
+  if (device_.info().type == ocl::DeviceType::kGpu) {
+    blocks_.has_drawn_surface = true;  // such frames begin by another kernel
+    camera_rays_->begin();
+    camera_rays_->enqueue_pass();
+    blocks_.forget_requests();
+    blocks_.has_drawn_surface = false;
+  }
   blocks_.cache.classify(rays);
   blocks_.cache.count_touched(rays, true);
   for (Level &level : blocks_.levels)

@@ -1,5 +1,6 @@
 #include "core/render/ray_waves.hpp"
 
+#include <utility>
 #include <vector>
 
 #include "core/frame/field_values.hpp"
@@ -21,6 +22,10 @@ RaysWave::RaysWave(BlockStore &blocks, Wavefront &rays, std::uint32_t group_size
   const bool decodes = on_demand == DecodeOnDemand::kAuto ? MarchPackets::may_decode(device)
                                                           : on_demand == DecodeOnDemand::kOn;
   const DeviceStream &stream = blocks.levels[0].stream;
+  if (device.type == ocl::DeviceType::kGpu && source == RaySource::kCamera &&
+      blocks.levels.size() == 1)
+    start_and_march_.emplace(blocks.device, rays.num_rays, group_size, solver,
+                             blocks.cache.slot_type);
   if (in_packets && MarchPackets::has(solver) && source == RaySource::kCamera) {
     march_packets_.emplace(blocks.device, rays.num_rays, solver,
                            decodes && !stream.window ? &stream : nullptr, blocks.cache.slot_type);
@@ -31,10 +36,28 @@ RaysWave::RaysWave(BlockStore &blocks, Wavefront &rays, std::uint32_t group_size
 void RaysWave::start(bool begins_frame) {
   const auto stage = blocks_.device.timer().stage("start_rays");
   if (blocks_.has_requests()) rays_.forget_rays();
+  starts_ = Start::kNone;
   if (in_packets()) {
     march_packets_->begin_frame();
+  } else if (start_and_march_ && blocks_.has_drawn_surface && !has_bands()) {
+    starts_ = begins_frame ? Start::kFrame : Start::kWave;
   } else {
     start_rays_(macrocells(), rays_, begins_frame);
+  }
+}
+
+void RaysWave::march() {
+  if (in_packets() && !has_bands()) {
+    (*march_packets_)(macrocells(), blocks_.levels[0].stream, blocks_.cache, rays_);
+  } else if (in_packets() && march_packets_->begins()) {
+    std::vector<MarchPackets::Band> bands;
+    for (std::size_t i = blocks_.drawing.first; i < blocks_.drawing.end; ++i)
+      bands.push_back({blocks_.levels[i].stream, blocks_.levels[i].frame});
+    (*march_packets_)(macrocells(), bands, blocks_.cache, rays_);
+  } else if (const Start starts = std::exchange(starts_, Start::kNone); starts != Start::kNone) {
+    (*start_and_march_)(macrocells(), blocks_.cache, rays_, starts == Start::kFrame);
+  } else {
+    march_(macrocells(), blocks_.cache, rays_);
   }
 }
 
@@ -44,16 +67,7 @@ void RaysWave::enqueue_pass() {
   blocks_.provide(rays_);
   {
     const auto stage = timer.stage("march");
-    if (in_packets() && !has_bands()) {
-      (*march_packets_)(macrocells(), blocks_.levels[0].stream, blocks_.cache, rays_);
-    } else if (in_packets() && march_packets_->begins()) {
-      std::vector<MarchPackets::Band> bands;
-      for (std::size_t i = blocks_.drawing.first; i < blocks_.drawing.end; ++i)
-        bands.push_back({blocks_.levels[i].stream, blocks_.levels[i].frame});
-      (*march_packets_)(macrocells(), bands, blocks_.cache, rays_);
-    } else {
-      march_(macrocells(), blocks_.cache, rays_);
-    }
+    march();
   }
   if (blocks_.counts_touched) {  // before more blocks are stamped, as needed
     const auto stage = timer.stage("touched");

@@ -4,7 +4,8 @@
 //   start_rays -> march -> request -> [ cache -> decode -> march -> request ]*
 //
 // On CPUs march_packets does the work of start_rays and march, and of cache and decode if there
-// are free slots. In frames of several levels of detail, it does so in the first pass.
+// are free slots. In frames of several levels of detail, it does so in the first pass. On GPUs
+// start_and_march does the work of both in the first pass, if the last frame drew the same surface.
 
 #include <cstdint>
 #include <optional>
@@ -20,6 +21,7 @@
 #include "core/stages/march_packets.hpp"
 #include "core/stages/request_ahead.hpp"
 #include "core/stages/smooth_normals.hpp"
+#include "core/stages/start_and_march.hpp"
 #include "core/stages/start_rays.hpp"
 
 namespace isowave::core {
@@ -45,6 +47,8 @@ class RaysWave : public Wave {
 
  private:
   void start(bool begins_frame);
+  /// A pass's march, by whatever kernel.
+  void march();
   const Macrocells &macrocells() const { return blocks_.levels[0].macrocells; }
   /// Whether rays begin and end in bands of levels of detail, or where they are clipped.
   bool has_bands() const { return draws_levels(rays_) || rays_.is_clipped(); }
@@ -55,6 +59,9 @@ class RaysWave : public Wave {
   Wavefront &rays_;
   StartRays start_rays_;
   March march_;
+  std::optional<StartAndMarch> start_and_march_;  ///< instead of both in the first pass of frames
+  enum class Start { kNone, kWave, kFrame };
+  Start starts_ = Start::kNone;                ///< what start_and_march_ begins in the next pass
   std::optional<MarchPackets> march_packets_;  ///< instead of start_rays_ and march_
   bool bands_in_packets_ =
       false;  ///< also in frames with bands, since blocks are decoded on demand

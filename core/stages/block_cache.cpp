@@ -94,17 +94,16 @@ BlockCache::BlockCache(ocl::Device &device, const Limits &limits, const ocl::Buf
 }
 
 void BlockCache::make_empty() {
-  const std::size_t empty = std::size_t{8} * empty_page(num_slots),
-                    directory = directory_begin(num_slots);
-  table.fill(ISO_BLOCK_ABSENT, empty, 8);
-  table.fill(empty_page(num_slots), directory, table.size() - directory);
-  slot_block_ids.fill(ISO_INVALID_ID);
-  clear();
+  clear(static_cast<uint>(table.size() - directory_begin(num_slots)));
 }
 
 void BlockCache::clear() {
-  clear_(slots_range_, num_slots, blocks_x_, blocks_y_, table, slot_block_ids, slot_stamps,
-         free_slots, state);
+  clear(0);
+}
+
+void BlockCache::clear(uint directory_words) {
+  clear_(slots_range_, num_slots, blocks_x_, blocks_y_, directory_words, table, slot_block_ids,
+         slot_stamps, free_slots, state);
 }
 
 void BlockCache::resize(const Limits &limits) {

@@ -105,8 +105,9 @@ struct BlockCache {
   ocl::Buffer<CacheState> state;        ///< [1]
 
  private:
-  /// Clears buffers that were just made.
+  /// clear() of buffers that were just made.
   void make_empty();
+  void clear(uint directory_words);
 
   BlockCache(ocl::Device &device, const Limits &limits, const ocl::BufferSizes &sizes,
              std::uint32_t group_size, const ocl::Defines &defines);
