@@ -9,6 +9,39 @@
 #include "portable/block_cells.h"
 #include "portable/window.h"
 
+/// How far a ray has got.
+typedef struct RayWay {
+  int result;       ///< ISO_RAY_*
+  uint first;       ///< the first active block that it meets, or ISO_INVALID_ID
+  uint at;          ///< the block in which it did not go on, if it waits
+  uint num_blocks;  ///< that it has left behind
+  BlockChange change;
+} RayWay;
+
+/// Takes a pixel's ray on until it hits, leaves or waits.
+///
+/// blocks  [ISO_BLOCKS_AT_ONCE] scratch, ISO_SCRATCH_STRIDE apart
+ISO_INLINE void take_ray_on(const FrameParams *frame, global const uint *macrocell_masks,
+                            const CacheReader *cache, const Ray *ray, LastPlanes last, uint pixel,
+                            ISO_SCRATCH uint *blocks, RayWay *way) {
+  const uint x = pixel % frame->view.width, y = pixel / frame->view.width;
+  uint next = x >= frame->screen.begin_x && x < frame->screen.end_x && y >= frame->screen.begin_y &&
+                      y < frame->screen.end_y
+                  ? first_block(frame, ray)
+                  : ISO_INVALID_ID;
+  while (next != ISO_INVALID_ID && way->result == ISO_RAY_LEFT) {
+    const uint num_found = find_blocks(frame, macrocell_masks, ray, &next, ISO_BLOCKS_AT_ONCE,
+                                       blocks, ISO_SCRATCH_STRIDE);
+    if (way->first == ISO_INVALID_ID && num_found != 0) way->first = blocks[0];
+    for (uint i = 0; i < num_found && way->result == ISO_RAY_LEFT; ++i) {
+      way->at = blocks[i * ISO_SCRATCH_STRIDE];
+      way->result = march_block(frame, cache, ray, last, block_coords(frame, way->at), 0,
+                                ISO_SIDE_UNKNOWN, 0, 0, &way->change);
+      if (way->result == ISO_RAY_LEFT) ++way->num_blocks;
+    }
+  }
+}
+
 /// Begins a wave of the camera's rays, and takes each on until it hits, leaves or waits. Frames
 /// have one level of detail, and are not clipped.
 ///
@@ -55,47 +88,30 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_an
   for (uint begin = get_global_id(0) - item; begin < num_tiled; begin += get_global_size(0)) {
     const uint pixel =
         begin + item < num_tiled ? tiled_pixel(frame, image, begin + item) : ISO_INVALID_ID;
-    int result = ISO_RAY_LEFT;
-    uint first = ISO_INVALID_ID, waits_at = ISO_INVALID_ID;
+    RayWay way;
+    way.result = ISO_RAY_LEFT;
+    way.first = way.at = ISO_INVALID_ID;
+    way.num_blocks = 0;
     if (pixel != ISO_INVALID_ID) {
-      const uint x = pixel % frame->view.width, y = pixel / frame->view.width;
       const Ray ray = make_ray(frame, pixel);
-      uint next = x >= frame->screen.begin_x && x < frame->screen.end_x &&
-                          y >= frame->screen.begin_y && y < frame->screen.end_y
-                      ? first_block(frame, &ray)
-                      : ISO_INVALID_ID;
-      BlockChange change;
-      while (next != ISO_INVALID_ID && result == ISO_RAY_LEFT) {
-        const uint num_found = find_blocks(frame, macrocell_masks, &ray, &next, ISO_BLOCKS_AT_ONCE,
-                                           blocks, ISO_SCRATCH_STRIDE);
-        if (first == ISO_INVALID_ID && num_found != 0) first = blocks[0];
-        for (uint at = 0; at < num_found && result == ISO_RAY_LEFT; ++at) {
-          const uint block_id = blocks[at * ISO_SCRATCH_STRIDE];
-          result = march_block(frame, &reader, &ray, last, block_coords(frame, block_id), 0,
-                               ISO_SIDE_UNKNOWN, 0, 0, &change);
-          if (result == ISO_RAY_LEFT) {
-            ++num_blocks;
-          } else {
-            waits_at = block_id;
-          }
-        }
-      }
-      if (first != ISO_INVALID_ID) ++num_rays;
-      if (result == ISO_RAY_HIT) {
-        hits[pixel] = hit_of(frame, (global const ClipParams *)0, &ray, &change);
+      take_ray_on(frame, macrocell_masks, &reader, &ray, last, pixel, blocks, &way);
+      num_rays += (uint)(way.first != ISO_INVALID_ID);
+      num_blocks += way.num_blocks;
+      if (way.result == ISO_RAY_HIT) {
+        hits[pixel] = hit_of(frame, (global const ClipParams *)0, &ray, &way.change);
         ++num_hits;
         ++num_blocks;
       } else {
         hits[pixel] = no_hit();
       }
     }
-    const int waits = result == ISO_RAY_DOUBT || result == ISO_RAY_WAITS;
-    const uint log_ahead =
-        waits_at == first ? ISO_FIRST_LOG_AHEAD : further_ahead(ISO_FIRST_LOG_AHEAD);
+    const int waits = way.result == ISO_RAY_DOUBT || way.result == ISO_RAY_WAITS;
     uint entry = 0;
     if (waits) {
-      ray_block_ids[pixel] = waits_at;
-      entry = pack_entry(pixel, log_ahead, result == ISO_RAY_DOUBT ? 1u : 0u);
+      const uint log_ahead =
+          way.at == way.first ? ISO_FIRST_LOG_AHEAD : further_ahead(ISO_FIRST_LOG_AHEAD);
+      ray_block_ids[pixel] = way.at;
+      entry = pack_entry(pixel, log_ahead, way.result == ISO_RAY_DOUBT ? 1u : 0u);
     }
     append_entry(waits, entry, counters, &counts->next_active_count, next_active_ray_ids);
   }

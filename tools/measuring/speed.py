@@ -265,7 +265,7 @@ KERNELS = (
     "(active_blocks|block_triangles|marching_cubes|noise_field|request_surface)/.*edge:256",
     "(ambient|bounce|field_values|hit_positions|initial_rays|kept_picture)/.*width:1280",
     "(march|request_ahead|resident)/.*width:1280",
-    "(march_packets|shade|smooth_normals|start_rays)/.*width:1280",
+    "(march_packets|shade|smooth_normals|start_and_march|start_rays)/.*width:1280",
     "block_cache/.*(uniform|hot)/width:1280/key_bits:18",
     "layers/.*width:1280",
     "composite/.*width:1280.*n_spec:(1|64)/",
