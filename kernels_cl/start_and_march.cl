@@ -42,10 +42,9 @@ ISO_INLINE void take_ray_on(const FrameParams *frame, global const uint *macroce
   }
 }
 
-/// Begins a wave of the camera's rays, and takes each on until it hits, leaves or waits. Frames
+/// Begins a frame with the camera's rays, and takes each on until it hits, leaves or waits. Frames
 /// have one level of detail, and are not clipped.
 ///
-/// begins_frame  1: and with it a frame, for the stamps of cache slots (slot_stamps.h)
 /// prev    counts of the last pass of the wave before
 /// other arguments as march
 /// Out     hits [pixel] of all pixels; next_active_ray_ids [counts->next_active_count],
@@ -53,11 +52,11 @@ ISO_INLINE void take_ray_on(const FrameParams *frame, global const uint *macroce
 ///         block; *next_counts, opened
 /// Launch  groups of ISO_GROUP_SIZE, which stride over the tiles of the picture
 kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_and_march(
-    const FrameParams frame_params, uint begins_frame, global const uint *macrocell_masks,
-    global const uint *table, global const ulong *inside, global ulong *changing,
-    global const SlotValue *cache_values, global const PassCounts *prev, global PassCounts *counts,
-    global PassCounts *next_counts, global uint *next_active_ray_ids, global uint *ray_block_ids,
-    global HitRecord *hits, global uint *slot_stamps, global CacheState *cache) {
+    const FrameParams frame_params, global const uint *macrocell_masks, global const uint *table,
+    global const ulong *inside, global ulong *changing, global const SlotValue *cache_values,
+    global const PassCounts *prev, global PassCounts *counts, global PassCounts *next_counts,
+    global uint *next_active_ray_ids, global uint *ray_block_ids, global HitRecord *hits,
+    global uint *slot_stamps, global CacheState *cache) {
   const FrameParams *frame = &frame_params;
   ISO_SCRATCH_ARRAY(slots, 8);
   ISO_SCRATCH_ARRAY(blocks, ISO_BLOCKS_AT_ONCE);
@@ -76,10 +75,8 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void start_an
   };
   uint num_hits = 0, num_blocks = 0, num_rays = 0;
   if (get_global_id(0) == 0) {
-    if (begins_frame != 0) {
-      counts->last_frame_pass = prev->frame_pass;
-      counts->frame_pass = counts->pass;
-    }
+    counts->last_frame_pass = prev->frame_pass;
+    counts->frame_pass = counts->pass;
     counts->window_count = first_window(frame);
     open_march(frame, prev, counts, next_counts, cache);
   }

@@ -36,12 +36,11 @@ RaysWave::RaysWave(BlockStore &blocks, Wavefront &rays, std::uint32_t group_size
 void RaysWave::start(bool begins_frame) {
   const auto stage = blocks_.device.timer().stage("start_rays");
   if (blocks_.has_requests()) rays_.forget_rays();
-  starts_ = Start::kNone;
+  starts_and_marches_ = begins_frame && start_and_march_ && !in_packets() &&
+                        blocks_.has_drawn_surface && !has_bands();
   if (in_packets()) {
     march_packets_->begin_frame();
-  } else if (start_and_march_ && blocks_.has_drawn_surface && !has_bands()) {
-    starts_ = begins_frame ? Start::kFrame : Start::kWave;
-  } else {
+  } else if (!starts_and_marches_) {
     start_rays_(macrocells(), rays_, begins_frame);
   }
 }
@@ -54,8 +53,8 @@ void RaysWave::march() {
     for (std::size_t i = blocks_.drawing.first; i < blocks_.drawing.end; ++i)
       bands.push_back({blocks_.levels[i].stream, blocks_.levels[i].frame});
     (*march_packets_)(macrocells(), bands, blocks_.cache, rays_);
-  } else if (const Start starts = std::exchange(starts_, Start::kNone); starts != Start::kNone) {
-    (*start_and_march_)(macrocells(), blocks_.cache, rays_, starts == Start::kFrame);
+  } else if (std::exchange(starts_and_marches_, false)) {
+    (*start_and_march_)(macrocells(), blocks_.cache, rays_);
   } else {
     march_(macrocells(), blocks_.cache, rays_);
   }

@@ -60,9 +60,8 @@ class RaysWave : public Wave {
   StartRays start_rays_;
   March march_;
   std::optional<StartAndMarch> start_and_march_;  ///< instead of both in the first pass of frames
-  enum class Start { kNone, kWave, kFrame };
-  Start starts_ = Start::kNone;                ///< what start_and_march_ begins in the next pass
-  std::optional<MarchPackets> march_packets_;  ///< instead of start_rays_ and march_
+  bool starts_and_marches_ = false;               ///< in the next pass
+  std::optional<MarchPackets> march_packets_;     ///< instead of start_rays_ and march_
   bool bands_in_packets_ =
       false;  ///< also in frames with bands, since blocks are decoded on demand
   RequestAhead request_ahead_;

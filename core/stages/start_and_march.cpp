@@ -19,10 +19,9 @@ StartAndMarch::StartAndMarch(ocl::Device &device, std::uint64_t num_pixels,
     : range_(ocl::Range::strided(num_pixels, group_size, device, 16)),
       kernel_(device, defines_of(group_size, solver, slots)) {}
 
-void StartAndMarch::operator()(const Macrocells &macrocells, BlockCache &cache, Wavefront &rays,
-                               bool begins_frame) {
-  kernel_(range_, rays.frame, begins_frame ? 1 : 0, macrocells.masks(), cache.table, cache.inside,
-          cache.changing, cache.values, rays.previous_counts, rays.counts, rays.next_counts,
+void StartAndMarch::operator()(const Macrocells &macrocells, BlockCache &cache, Wavefront &rays) {
+  kernel_(range_, rays.frame, macrocells.masks(), cache.table, cache.inside, cache.changing,
+          cache.values, rays.previous_counts, rays.counts, rays.next_counts,
           rays.next_active_ray_ids, rays.ray_block_ids, rays.hits, cache.slot_stamps, cache.state);
 }
 

@@ -14,15 +14,13 @@ class StartAndMarch {
   StartAndMarch(ocl::Device &device, std::uint64_t num_pixels, std::uint32_t group_size,
                 Solver solver, SlotType slots = SlotType::kFloat32);
 
-  /// Begins a wave of the camera's rays in the pass at work, and takes them as far as blocks are
+  /// Begins a frame with the camera's rays in the pass at work, and takes them as far as blocks are
   /// cached. The frame has one level of detail, and is not clipped.
   ///
-  /// begins_frame  and with it a frame, for the stamps of cache slots
   /// In          rays.previous_counts: next_active_count is 0
   /// Out         rays.hits of all pixels; the rest as March
   /// Waits       no
-  void operator()(const Macrocells &macrocells, BlockCache &cache, Wavefront &rays,
-                  bool begins_frame = true);
+  void operator()(const Macrocells &macrocells, BlockCache &cache, Wavefront &rays);
 
  private:
   ocl::Range range_;

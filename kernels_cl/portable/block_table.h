@@ -2,8 +2,8 @@
 ///
 /// A page has the slots of a group of 2^3 blocks, since a ray asks for neighbours. The directory
 /// has a page for each group. There are as many pages as slots, so that none is ever missing: a
-/// group has a page only while one of its blocks is cached. All groups without blocks have the page
-/// behind these, of which all slots are ISO_BLOCK_ABSENT: looking a block up needs no branch.
+/// group has a page only while one of its blocks is cached. Groups without cached blocks share
+/// one more page, whose slots are ISO_BLOCK_ABSENT. So looking a block up needs no branch.
 ///
 /// In words, for S slots:
 ///   [8 * (S + 1)]  pages; in each x + 2y + 4z
@@ -36,7 +36,7 @@ typedef struct CacheState {
   uint recycled;      ///< of the victims, those that their own frame had used
 } CacheState;
 
-/// The page of groups without cached blocks, of a cache with so many slots.
+/// The page that groups without cached blocks share.
 ISO_INLINE uint empty_page(uint num_slots) {
   return num_slots;
 }
@@ -48,8 +48,10 @@ ISO_INLINE uint directory_begin(uint num_slots) {
   return page_count_at(num_slots, num_slots);
 }
 
-/// The number of a block's group: x, y, layer of the block in the grid in which ids count, which is
-/// so many blocks wide.
+/// The number of a block's group.
+///
+/// blocks_x, blocks_y  of the grid in which ids of blocks count
+/// x, y, layer         of the block in that grid
 ISO_INLINE uint group_of_block(uint blocks_x, uint blocks_y, uint x, uint y, uint layer) {
   return x / 2u + (blocks_x + 1u) / 2u * (y / 2u + (blocks_y + 1u) / 2u * (layer / 2u));
 }

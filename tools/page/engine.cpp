@@ -262,87 +262,31 @@ FrameRequest frame_request(const json &request) {
   return frame;
 }
 
-/// Writes arrays of arrays as JSON.
-class ListText {
- public:
-  void begin() { text_ += '['; }
-  void end() {
-    if (text_.back() == ',') text_.pop_back();
-    text_ += "],";
-  }
-  void add(double number) { text_ += json(number).dump() + ','; }
-  void add(const std::string &text) { text_ += json(text).dump() + ','; }
-  template <class T, std::size_t kSize>
-  void add(const std::array<T, kSize> &numbers) {
-    begin();
-    for (const T number : numbers) add(static_cast<double>(number));
-    end();
-  }
-  std::string take() {
-    text_.pop_back();
-    return std::move(text_);
-  }
-
- private:
-  std::string text_;
-};
-
-void add_group(const AnnotationGroup &group, ListText &text) {
-  text.begin();
-  text.add(group.begin);
-  text.add(group.end);
-  text.begin();
-  for (const AnnotationBox &box : group.boxes) {
-    text.begin();
-    text.add(box.begin);
-    text.add(box.end);
-    text.add(box.color);
-    text.end();
-  }
-  text.end();
-  text.begin();
-  for (const AnnotationStroke &stroke : group.strokes) {
-    text.begin();
-    text.begin();
-    for (const PicturePlace &point : stroke.points) text.add(point);
-    text.end();
-    text.add(stroke.width);
-    text.add(stroke.color);
-    text.end();
-  }
-  text.end();
-  text.begin();
-  for (const AnnotationText &words : group.texts) {
-    text.begin();
-    text.add(words.place);
-    text.add(words.anchor);
-    text.add(words.size);
-    text.add(words.text);
-    text.add(words.color);
-    text.end();
-  }
-  text.end();
-  text.add(group.halo);
-  text.add(group.halo_color);
-  text.end();
+/// The values of a group's fields, in order.
+json values_of(const AnnotationGroup &group) {
+  json boxes = json::array(), strokes = json::array(), texts = json::array();
+  for (const auto &[begin, end, color] : group.boxes)
+    boxes.push_back(json::array({begin, end, color}));
+  for (const auto &[points, width, color] : group.strokes)
+    strokes.push_back(json::array({points, width, color}));
+  for (const auto &[place, anchor, size, text, color] : group.texts)
+    texts.push_back(json::array({place, anchor, size, text, color}));
+  return json::array({group.begin, group.end, boxes, strokes, texts, group.halo, group.halo_color});
 }
 
-/// The annotations of a request's scene, as JSON: for each group, the values of its fields in
-/// order. None: the picture is too small.
+/// The annotations of a request's scene, as JSON. None: the picture is too small.
 std::string annotations_of(const json &request, FrameRequest frame,
                            const FrameStatistics &statistics) {
   const std::optional<Annotations> wanted = parse_scene(request.at("scene").dump()).annotations;
   const auto &size = request.at("annotated");
   frame.size = {size.at(0), size.at(1), 1};
-  ListText text;
-  text.begin();
+  json groups = json::array();
   if (wanted && has_room_for_annotations(frame.size)) {
     for (const AnnotationGroup &group :
          annotation_layout(*wanted, frame, statistics.color_range, statistics.slice_range))
-      add_group(group, text);
+      groups.push_back(values_of(group));
   }
-  text.end();
-  return text.take();
+  return groups.dump();
 }
 
 /// Draws what is not finished of a request. Returns nothing if chunks are missing.

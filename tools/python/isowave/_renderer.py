@@ -410,7 +410,7 @@ class Renderer:
             Largest distance between voxels of coarser levels [pixels], which needs levels=True, and
             largest difference of decoded voxels from the compressed ones [voxel values]; 0: none.
         time_budget_ms
-            Draws the best picture possible in so many milliseconds. Needs time_budget=True.
+            Time within which the best possible picture is drawn [ms]. Needs time_budget=True.
         ambient_rays
             Rays from each hit, up to 255, that find out how much of the sky it sees. 16 and more
             look smooth. Each takes about as long as a frame without any. Needs rays=True.
