@@ -137,9 +137,41 @@ TEST_F(CliHost, OptionsOfDevicesAreRefusedOrTakeADevice) {
 }
 
 TEST_F(CliHost, OtherCommandsSayThatTheyNeedADevice) {
-  const std::string arguments = " extract generate:gyroid_8x8x8_uint8 -i 128 -o " + path("a.ply");
+  const std::string arguments = " bench solvers generate:gyroid_8x8x8_uint8";
   expect_error_in(kOnlyPocl, arguments + " --device host", "'host' is no OpenCL device");
   expect_error_in(kOnlyPocl + " ISOWAVE_DEVICE=host", arguments, "'host' (from ISOWAVE_DEVICE)");
+}
+
+TEST_F(CliHost, ExtractsTheMeshOfADevice) {
+  const std::string extract = " extract generate:gyroid_8x8x8_uint8 -i 128 ",
+                    to_file = extract + "-o " + path("a.ply") + " ";
+  const auto mesh_in = [&](const std::string &environment, const std::string &options,
+                           const std::string &says) {
+    const ProgramResult result =
+        run_in(environment, to_file + options + " --stats " + path("s.json"));
+    EXPECT_EQ(result.status, 0) << result.err;
+    EXPECT_THAT(result.out, HasSubstr(says)) << options;
+    return read_file(folder_ / "a.ply");
+  };
+  const std::string mesh = mesh_in(kOnlyPocl, "--device cpu", "device 0: ");
+  EXPECT_EQ(mesh_in(kOnlyPocl, "", "host: "), mesh);
+  EXPECT_EQ(mesh_in(kNoDriver, "", "host: "), mesh);
+  EXPECT_EQ(mesh_in(kGpu + " ISOWAVE_DEVICE=host", "", "host memory: "), mesh);
+  const json stats = json::parse(read_file(folder_ / "s.json"));
+  EXPECT_GT(stats.at("host").at("threads"), 0);
+  EXPECT_GT(stats.at("host").at("memory"), 0);
+  EXPECT_GT(stats.at("decoded_blocks"), 0);
+  EXPECT_GT(stats.at("total_ms"), 0);
+  EXPECT_FALSE(stats.contains("device"));
+  EXPECT_EQ(mesh_in(kGpu, "", "device 0: "), mesh);
+  EXPECT_EQ(mesh_in(kOnlyPocl, "--cache-slots 20", "device 0: "), mesh) << "devices have slots";
+  EXPECT_EQ(mesh_in(kOnlyPocl, "--memory-budget 30KB", "device 0: "), mesh) << "too little";
+  for (const std::string option : {"--cache-slots", "--stream"}) {
+    const std::string given = to_file + option + (option == "--stream" ? " host" : " 20");
+    expect_error_in(kOnlyPocl, given + " --device host", option + ": the host has no such option");
+    expect_error_in(kNoDriver, given, option + ": it needs an OpenCL device, and there is none");
+  }
+  expect_error_in(kOnlyPocl, to_file + "--device host --memory-budget 1KB", "raise the limit");
 }
 
 TEST_F(CliHost, StatisticsAreThoseThatTheHostHas) {

@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <vector>
 
 #include "core/base/error.hpp"
+#include "core/base/ms_since.hpp"
 #include "core/host/host_blocks.hpp"
 #include "core/mesh/cell_triangles.hpp"
 #include "core/platform/memory.hpp"
@@ -21,10 +23,16 @@ namespace {
 /// Listed blocks that a thread takes at a time, and that are counted before progress is reported.
 constexpr std::size_t kRunBlocks = 64, kBatchBlocks = std::size_t{1} << 17;
 
-std::uint64_t checked_limit(const VolumeInfo &info, std::uint64_t limit) {
-  const std::uint64_t least =
-      HostBlocks::bytes(info) + ISO_MESH_NEIGHBOURS * platform::page_bytes();
-  if (limit == 0) limit = platform::host_memory() / 4;
+std::uint64_t least_bytes(const VolumeInfo &info) {
+  return HostBlocks::bytes(info) + ISO_MESH_NEIGHBOURS * platform::page_bytes();
+}
+
+std::uint64_t limit_or_default(std::uint64_t limit) {
+  return limit != 0 ? limit : platform::host_memory() / 4;
+}
+
+std::uint64_t checked_limit(const VolumeInfo &info, std::uint64_t given) {
+  const std::uint64_t least = least_bytes(info), limit = limit_or_default(given);
   if (least <= limit) return limit;
   throw Error(
       "extracting on the host takes {} bytes of memory at least, for value ranges of all blocks, "
@@ -55,7 +63,7 @@ class HostExtractor {
     list();
   }
 
-  void run(MeshSink &sink, const Progress &progress) {
+  HostExtractStats run(MeshSink &sink, const Progress &progress) {
     const auto report = [&](std::uint32_t step, std::size_t done) {
       const std::uint64_t all = 2 * entries_.size();
       if (progress)
@@ -78,6 +86,7 @@ class HostExtractor {
       begin = write(begin, sink);
       report(1, begin);
     }
+    return {entries_.size(), blocks_.num_decoded(), blocks_.bytes()};
   }
 
  private:
@@ -315,13 +324,20 @@ class HostExtractor {
 
 }  // namespace
 
-void extract_on_host(const CompressedVolume &volume, float isovalue,
-                     const HostExtractorOptions &options, MeshSink &sink,
-                     const Progress &progress) {
+bool fits_host_extractor(const VolumeInfo &info, std::uint64_t memory_limit) {
+  return least_bytes(info) <= limit_or_default(memory_limit);
+}
+
+HostExtractStats extract_on_host(const CompressedVolume &volume, float isovalue,
+                                 const HostExtractorOptions &options, MeshSink &sink,
+                                 const Progress &progress) {
+  const auto begin = std::chrono::steady_clock::now();
   if (std::isnan(isovalue)) throw Error("the isovalue is NaN: give a number");
   check_volume_info(volume.info, "the volume");
   check_drawable(volume.info, "the volume");
-  HostExtractor(volume, isovalue, options).run(sink, progress);
+  HostExtractStats stats = HostExtractor(volume, isovalue, options).run(sink, progress);
+  stats.total_ms = ms_since(begin);
+  return stats;
 }
 
 }  // namespace isowave::core

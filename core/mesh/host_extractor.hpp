@@ -22,13 +22,25 @@ struct HostExtractorOptions {
   std::uint32_t part_vertices = 1u << 20;  ///< most vertices of a part, unless one block has more
 };
 
+/// Whether the limit suffices for a volume, as extract_on_host() needs it.
+///
+/// memory_limit  as HostExtractorOptions::memory_limit
+bool fits_host_extractor(const VolumeInfo &info, std::uint64_t memory_limit);
+
+struct HostExtractStats {
+  std::uint64_t listed_blocks = 0;   ///< whose cells the surface may pass
+  std::uint64_t decoded_blocks = 0;  ///< more than needed if memory_limit does not hold all
+  std::uint64_t memory_bytes = 0;    ///< value ranges and decoded blocks
+  double total_ms = 0;               ///< wall clock, the sink's work included
+};
+
 /// Gives the isosurface of a volume, or of a level of detail of it, to `sink`: triangles that share
 /// their vertices. Reads the whole volume for its value ranges.
 ///
 /// Throws  Error: a NaN isovalue, a limit that is too small, more than 2^32 - 1 vertices, a file
 ///         that cannot be read; what the sink throws
-void extract_on_host(const CompressedVolume &volume, float isovalue,
-                     const HostExtractorOptions &options, MeshSink &sink,
-                     const Progress &progress = {});
+HostExtractStats extract_on_host(const CompressedVolume &volume, float isovalue,
+                                 const HostExtractorOptions &options, MeshSink &sink,
+                                 const Progress &progress = {});
 
 }  // namespace isowave::core

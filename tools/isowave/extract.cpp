@@ -8,10 +8,12 @@
 #include <string>
 
 #include "core/base/error.hpp"
+#include "core/base/parallel_for.hpp"
 #include "core/base/text.hpp"
 #include "core/extract/extractor.hpp"
 #include "core/io/atomic_file.hpp"
 #include "core/io/file_name.hpp"
+#include "core/mesh/host_extractor.hpp"
 #include "core/mesh/mesh_changes.hpp"
 #include "core/mesh/mesh_file.hpp"
 #include "core/view/detail.hpp"
@@ -19,6 +21,7 @@
 #include "core/zfp/isovalue.hpp"
 #include "tools/isowave/commands.hpp"
 #include "tools/isowave/compile_report.hpp"
+#include "tools/isowave/device_choice.hpp"
 #include "tools/isowave/help_groups.hpp"
 #include "tools/isowave/outputs.hpp"
 #include "tools/isowave/program.hpp"
@@ -72,42 +75,72 @@ class Counted : public MeshSink {
   MeshSink &inner_;
 };
 
+/// What extracts: a device, or if that is null the host; what it did.
+struct Extraction {
+  std::unique_ptr<ocl::Device> device{};
+  ExtractStats on_device{};
+  HostExtractStats on_host{};
+
+  bool is_on_host() const { return device == nullptr; }
+  double total_ms() const { return is_on_host() ? on_host.total_ms : on_device.total_ms; }
+  std::uint64_t decoded_blocks() const {
+    return is_on_host() ? on_host.decoded_blocks : on_device.decoded_blocks;
+  }
+};
+
+/// What did it, and how.
+void add_statistics(nlohmann::ordered_json &document, const Extraction &done) {
+  if (done.is_on_host()) {
+    document.update({{"listed_blocks", done.on_host.listed_blocks},
+                     {"decoded_blocks", done.on_host.decoded_blocks},
+                     {"total_ms", done.on_host.total_ms}});
+    return;
+  }
+  const ExtractStats &stats = done.on_device;
+  document.update({{"listed_blocks", stats.listed_blocks},
+                   {"needed_blocks", stats.needed_blocks},
+                   {"decoded_blocks", stats.decoded_blocks},
+                   {"cache_slots", stats.cache_slots},
+                   {"count_batches", stats.count_batches},
+                   {"write_batches", stats.write_batches},
+                   {"list_ms", stats.list_ms},
+                   {"count_ms", stats.count_ms},
+                   {"write_ms", stats.write_ms},
+                   {"total_ms", stats.total_ms},
+                   {"memory", memory_json(done.device->ledger())}});
+}
+
 nlohmann::ordered_json stats_json(const ExtractArgs &options, const CompressedVolume &volume,
-                                  ocl::Device &device, const ExtractStats &stats,
-                                  const MeshSize &written, const SimplifiedMesh &simplified) {
+                                  const Extraction &done, const MeshSize &written,
+                                  const SimplifiedMesh &simplified) {
   const glm::uvec3 dims = volume.info.dims;
-  return {
-      {"program", program_name()},
-      {"device", device_json(device.info())},
-      {"volume",
-       {{"file", options.input},
-        {"dims", {dims.x, dims.y, dims.z}},
-        {"compression", compression_mode(volume)},
-        {"rate", volume.rate()},
-        {"max_voxel_error", volume.max_voxel_error ? nlohmann::ordered_json(*volume.max_voxel_error)
-                                                   : nlohmann::ordered_json()}}},
-      {"isovalue", *options.isovalue},
-      {"isovalue_suggested", options.isovalue_suggested},
-      {"level", options.level},
-      {"normals", options.normals},
-      {"vertex_places", options.vertices},
-      {"closed", options.changes.closed},
-      {"largest", options.changes.largest},
-      {"simplify", options.changes.simplify},
-      {"simplify_error", simplified.error},
-      {"vertices", written.num_vertices},
-      {"triangles", written.num_triangles},
-      {"listed_blocks", stats.listed_blocks},
-      {"needed_blocks", stats.needed_blocks},
-      {"decoded_blocks", stats.decoded_blocks},
-      {"cache_slots", stats.cache_slots},
-      {"count_batches", stats.count_batches},
-      {"write_batches", stats.write_batches},
-      {"list_ms", stats.list_ms},
-      {"count_ms", stats.count_ms},
-      {"write_ms", stats.write_ms},
-      {"total_ms", stats.total_ms},
-      {"memory", memory_json(device.ledger())}};
+  nlohmann::ordered_json document = {{"program", program_name()}};
+  if (done.is_on_host()) {
+    document["host"] = {{"threads", thread_count(0)}, {"memory", done.on_host.memory_bytes}};
+  } else {
+    document["device"] = device_json(done.device->info());
+  }
+  document.update({{"volume",
+                    {{"file", options.input},
+                     {"dims", {dims.x, dims.y, dims.z}},
+                     {"compression", compression_mode(volume)},
+                     {"rate", volume.rate()},
+                     {"max_voxel_error", volume.max_voxel_error
+                                             ? nlohmann::ordered_json(*volume.max_voxel_error)
+                                             : nlohmann::ordered_json()}}},
+                   {"isovalue", *options.isovalue},
+                   {"isovalue_suggested", options.isovalue_suggested},
+                   {"level", options.level},
+                   {"normals", options.normals},
+                   {"vertex_places", options.vertices},
+                   {"closed", options.changes.closed},
+                   {"largest", options.changes.largest},
+                   {"simplify", options.changes.simplify},
+                   {"simplify_error", simplified.error},
+                   {"vertices", written.num_vertices},
+                   {"triangles", written.num_triangles}});
+  add_statistics(document, done);
+  return document;
 }
 
 void check_outputs(const ExtractArgs &options) {
@@ -129,7 +162,38 @@ void suggest_isovalue(ExtractArgs &options, const CompressedVolume &volume, bool
   check_outputs(options);
 }
 
-void run_extract(ExtractArgs options) {
+/// Extracts the surface, changed as the options say, to `written`.
+SimplifiedMesh extract_changed(const ExtractArgs &options, const CompressedVolume &volume,
+                               const CompressedVolume &level, Extraction &done, MeshSink &written) {
+  const float isovalue = drawn_isovalue(volume, *options.isovalue);
+  const ExtractorOptions &wanted = options.extractor;
+  return give_changed(
+      level, isovalue, wanted.vertices, options.changes, written, [&](MeshSink &sink) {
+        const Progress progress = make_progress_bar("extracting");
+        if (done.is_on_host()) {
+          done.on_host = extract_on_host(level, isovalue,
+                                         {.with_normals = wanted.with_normals,
+                                          .vertices = wanted.vertices,
+                                          .memory_limit = wanted.memory_budget},
+                                         sink, progress);
+        } else {
+          done.on_device = Extractor(*done.device, level, wanted).extract(isovalue, sink, progress);
+        }
+      });
+}
+
+void print_summary(const ExtractArgs &options, const Extraction &done, const MeshSize &written,
+                   const SimplifiedMesh &simplified) {
+  fmt::print("isovalue {}: {} {}, {} {}; {} {} decoded, {:.1f} ms\n", *options.isovalue,
+             with_commas(written.num_vertices), plural(written.num_vertices, "vertex", "vertices"),
+             with_commas(written.num_triangles),
+             plural(written.num_triangles, "triangle", "triangles"),
+             with_commas(done.decoded_blocks()), plural(done.decoded_blocks(), "block", "blocks"),
+             done.total_ms());
+  if (options.changes.simplify < 1) fmt::print("{}\n", describe(simplified));
+}
+
+void run_extract(const CLI::App &command, ExtractArgs options) {
   const bool names_output = options.output.empty();
   if (names_output) options.output = default_output(options);
   check_outputs(options);
@@ -140,43 +204,41 @@ void run_extract(ExtractArgs options) {
   check_changes(options.changes, options.extractor.vertices);
   if (options.level > 0) want_levels(options.compression);
 
-  const ocl::DeviceInfo info = ocl::choose_device(options.device);
-  fmt::print("device {}: {} ({}); choose another with --device or ISOWAVE_DEVICE\n", info.index,
-             info.name, info.platform);
-  ocl::Device device(info);
-  CompileReport compiling(device);
-  const CompressedVolume volume =
-      load_volume(options.input, to_overrides(options.volume), options.compression, &device);
+  Extraction done;
+  const ocl::DrawsOn chosen =
+      choose_device_or_host(options.device, first_given(command, {"--cache-slots", "--stream"}));
+  std::optional<CompileReport> compiling;
+  const auto open_device = [&] {
+    done.device = open_and_say(ocl::choose_device(options.device));
+    compiling.emplace(*done.device);
+  };
+  if (chosen == ocl::DrawsOn::kDevice) open_device();
+  const CompressedVolume volume = load_volume(options.input, to_overrides(options.volume),
+                                              options.compression, done.device.get());
   print_compression(options.input, volume);
   suggest_isovalue(options, volume, names_output);
   const CompressedVolume &level = level_of(volume, options.level);
-  Extractor extractor(device, level, options.extractor);
+  if (chosen == ocl::DrawsOn::kHostByDefault &&
+      !fits_host_extractor(level.info, options.extractor.memory_budget) &&
+      !ocl::list_devices().empty())
+    open_device();
+  if (done.is_on_host()) say_host();
   MeshFile file(options.output);
   Counted written(file);
-  ExtractStats stats;
-  const float isovalue = drawn_isovalue(volume, *options.isovalue);
-  const SimplifiedMesh simplified = give_changed(
-      level, isovalue, options.extractor.vertices, options.changes, written, [&](MeshSink &sink) {
-        stats = extractor.extract(isovalue, sink, make_progress_bar("extracting"));
-      });
-  compiling.finish();
+  const SimplifiedMesh simplified = extract_changed(options, volume, level, done, written);
+  if (compiling) compiling->finish();
   file.commit(make_progress_bar("writing"));
-  fmt::print("isovalue {}: {} {}, {} {}; {} {} decoded, {:.1f} ms\n", *options.isovalue,
-             with_commas(written.size.num_vertices),
-             plural(written.size.num_vertices, "vertex", "vertices"),
-             with_commas(written.size.num_triangles),
-             plural(written.size.num_triangles, "triangle", "triangles"),
-             with_commas(stats.decoded_blocks), plural(stats.decoded_blocks, "block", "blocks"),
-             stats.total_ms);
-  if (options.changes.simplify < 1) fmt::print("{}\n", describe(simplified));
+  print_summary(options, done, written.size, simplified);
   warn_of_isovalue(volume, *options.isovalue);
   if (const std::string notice = file.notice(); !notice.empty()) warn(notice);
-  fmt::print("wrote {}: {} bytes; device memory: peak {:.1f} MiB{}\n", one_line(options.output),
+  const double memory =
+      done.is_on_host() ? double(done.on_host.memory_bytes) : double(done.device->ledger().peak());
+  fmt::print("wrote {}: {} bytes; {} {:.1f} MiB{}\n", one_line(options.output),
              with_commas(OutputGroup::current()->bytes_of(options.output)),
-             double(device.ledger().peak()) / (1 << 20),
+             done.is_on_host() ? "host memory:" : "device memory: peak", memory / (1 << 20),
              names_output ? "; --output names another file" : "");
   if (!options.stats.empty())
-    write_json(stats_json(options, level, device, stats, written.size, simplified), options.stats);
+    write_json(stats_json(options, level, done, written.size, simplified), options.stats);
 }
 
 }  // namespace
@@ -228,14 +290,17 @@ void add_extract(CLI::App &app) {
                    "and --largest hold the whole surface in memory [1]")
       ->check(CLI::Range(1e-9, 1.0));
   command->add_option("--device", options->device,
-                      "device: index, cpu, gpu, or a part of its name (see `isowave devices`)");
+                      "host: this program extracts, without OpenCL; or an OpenCL device: index, "
+                      "cpu, gpu, or a part of its name (see `isowave devices`) [ISOWAVE_DEVICE, or "
+                      "the first GPU, or the host]");
   add_volume_options(*command, options->volume);
   add_compression_options(*command, options->compression);
   command
       ->add_option("--memory-budget", options->extractor.memory_budget,
                    "bound on the buffers that are made on the device, e.g. 600MB (1000^2) or 1GiB "
                    "(1024^3); a surface that needs more is extracted in batches [3/4 of the "
-                   "device's memory]")
+                   "device's memory]; on the host, on value ranges and decoded blocks [1/4 of its "
+                   "memory]")
       ->transform(byte_count())
       ->type_name("BYTES");
   command
@@ -250,14 +315,14 @@ void add_extract(CLI::App &app) {
       ->check(CLI::IsMember({"auto", "device", "host"}))
       ->capture_default_str();
   command->add_option("--stats", options->stats,
-                      "file for JSON statistics: blocks, batches, times, device memory");
+                      "file for JSON statistics: blocks, batches, times, memory");
   group_options(*command, "Options of every day",
                 {"--help", "--isovalue", "--output", "--level", "--normals", "--vertices",
                  "--closed", "--largest", "--simplify", "--device", "--stats"});
   group_volume_options(*command);
   group_compression_options(*command);
   group_options(*command, "Memory", {"--memory-budget", "--cache-slots", "--stream"});
-  command->callback([options] { run_extract(*options); });
+  command->callback([options, command] { run_extract(*command, *options); });
 }
 
 }  // namespace isowave::core::tools

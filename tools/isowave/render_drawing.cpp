@@ -18,6 +18,7 @@
 #include "core/io/file_name.hpp"
 #include "core/stages/march_packets.hpp"
 #include "reference/twin_renderer.hpp"
+#include "tools/isowave/device_choice.hpp"
 #include "tools/isowave/mpi_team.hpp"
 #include "tools/isowave/render_stats.hpp"
 
@@ -26,9 +27,7 @@ namespace isowave::core::tools {
 std::unique_ptr<ocl::Device> open_device(const RenderArgs &options, bool is_team) {
   const ocl::DeviceInfo info = is_team ? choose_local_device(options.device, MpiJob::local_rank())
                                        : ocl::choose_device(options.device);
-  fmt::print("device {}: {} ({}); choose another with --device or ISOWAVE_DEVICE\n", info.index,
-             info.name, info.platform);
-  return std::make_unique<ocl::Device>(info, !options.stats.empty() && !options.no_stage_times);
+  return open_and_say(info, !options.stats.empty() && !options.no_stage_times);
 }
 
 void set_wanted(RenderArgs &options) {
@@ -47,14 +46,7 @@ void set_wanted(RenderArgs &options) {
 
 void choose_drawing(const CLI::App &command, const RenderArgs &options, Drawing &drawing) {
   if (options.reference || drawing.is_team()) return;
-  drawing.draws_on = ocl::choose_drawing(options.device);
-  const std::string option = find_device_option(command);
-  if (option.empty() || !drawing.on_host()) return;
-  if (drawing.draws_on == ocl::DrawsOn::kHost)
-    throw Error("{}: the host has no such option: leave it out, or name a device", option);
-  if (ocl::list_devices().empty())
-    throw Error("{}: it needs an OpenCL device, and there is none: leave it out", option);
-  drawing.draws_on = ocl::DrawsOn::kDevice;
+  drawing.draws_on = choose_device_or_host(options.device, find_device_option(command));
 }
 
 namespace {
@@ -141,8 +133,7 @@ void load_alone(RenderArgs &options, Drawing &drawing) {
     drawing.draws_on = ocl::DrawsOn::kDevice;
     drawing.device = open_device(options, false);
   } else if (drawing.on_host()) {
-    fmt::print("host: {} {}; choose a device with --device or ISOWAVE_DEVICE\n", thread_count(0),
-               plural(thread_count(0), "thread", "threads"));
+    say_host();
   }
 }
 

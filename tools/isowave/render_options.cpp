@@ -1,4 +1,5 @@
 #include "tools/isowave/render_options.hpp"
+#include "tools/isowave/device_choice.hpp"
 
 #include <fmt/format.h>
 
@@ -267,12 +268,9 @@ void check_options(const CLI::App &command, const RenderArgs &options, const Tea
 }
 
 std::string find_device_option(const CLI::App &command) {
-  for (const char *name :
-       {"--cache-slots", "--stream", "--verbose", "--no-stage-times", "--pipeline", "--speculation",
-        "--max-speculation", "--solver", "--grouping", "--closest", "--group-size"}) {
-    if (command.count(name) > 0) return name;
-  }
-  return {};
+  return first_given(command, {"--cache-slots", "--stream", "--verbose", "--no-stage-times",
+                               "--pipeline", "--speculation", "--max-speculation", "--solver",
+                               "--grouping", "--closest", "--group-size"});
 }
 
 Outputs check_outputs(const RenderArgs &options, std::size_t num_views) {

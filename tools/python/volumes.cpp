@@ -182,7 +182,7 @@ nb::dict extract(const PyVolume &self, const std::string &device, double isovalu
     if (!goes_on) throw Stopped();
   };
   isowave::Mesh mesh = callbacks.without_gil([&] {
-    if (device == "host") return isowave::extract(self.volume, isovalue, options);
+    if (isowave::draws_on_host(device)) return isowave::extract(self.volume, isovalue, options);
     return isowave::extract(isowave::open_device(device), self.volume, isovalue, options);
   });
   nb::dict result;

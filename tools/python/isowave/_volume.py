@@ -368,8 +368,8 @@ class Volume(Voxels):
             Mesh.simplify_error. Closed meshes stay closed.
         device
             "host": this process extracts, without OpenCL. "gpu", "cpu", an index, or a part of a
-            name: an OpenCL device. None: $ISOWAVE_DEVICE, else the first GPU, else an OpenCL
-            device for the CPU. The mesh has the same bits.
+            name: an OpenCL device. None: $ISOWAVE_DEVICE, else the first GPU, else the host. The
+            mesh has the same bits.
         memory_budget
             Most device memory to take [bytes]; None: three quarters of it. On the host, of value
             ranges and decoded blocks; None: a quarter of its memory.

@@ -90,7 +90,7 @@ def test_verify_compares_a_device(no_name, leveled, monkeypatch):
         leveled.verify(12, device="host")
     monkeypatch.setenv("ISOWAVE_DEVICE", "host")
     with pytest.raises(isowave.Error, match="'host' .from ISOWAVE_DEVICE. is no OpenCL device"):
-        leveled.extract(12)
+        leveled.verify(12)
 
 
 def test_without_opencl_the_host_draws(tmp_path):
@@ -99,6 +99,7 @@ import isowave
 assert isowave.devices() == []
 image = isowave.open({str(FUEL)!r}, exact=True).render(10, size={SIZE})
 image.save({str(tmp_path / "host.png")!r})
+isowave.open({str(FUEL)!r}, exact=True).extract(10).save({str(tmp_path / "host.ply")!r})
 """
     hidden = {"OCL_ICD_VENDORS": "/nonexistent"}
     environment = {k: v for k, v in os.environ.items() if k != "ISOWAVE_DEVICE"} | hidden
@@ -106,3 +107,5 @@ image.save({str(tmp_path / "host.png")!r})
     expected = isowave.open(FUEL, exact=True).render(10, size=SIZE, device="cpu")
     expected.save(tmp_path / "device.png")
     assert (tmp_path / "host.png").read_bytes() == (tmp_path / "device.png").read_bytes()
+    isowave.open(FUEL, exact=True).extract(10, device="cpu").save(tmp_path / "device.ply")
+    assert (tmp_path / "host.ply").read_bytes() == (tmp_path / "device.ply").read_bytes()
