@@ -20,7 +20,8 @@ namespace {
 
 using test::TestVolume;
 
-constexpr WantedArrays kAll{.picture = true, .depth = true, .normals = true, .positions = true};
+constexpr WantedArrays kAll{
+    .picture = true, .depth = true, .normals = true, .positions = true, .hits = true};
 
 template <class T>
 bool same_bits(const HostArray<T> &a, const HostArray<T> &b) {
@@ -98,6 +99,9 @@ TEST_P(FrameArraysOnDevice, SmallFramesOfAllRenderersHaveTheSame) {
         EXPECT_EQ(arrays.picture.size(), 3 * size.num_pixels());
         EXPECT_EQ(each->shade().pixels, arrays.picture.copy());
         EXPECT_EQ(each->depth(), arrays.depth.copy());
+        const std::vector<HitRecord> hits = each->hits();
+        ASSERT_EQ(arrays.hits.size(), hits.size());
+        EXPECT_EQ(std::memcmp(arrays.hits.data(), hits.data(), arrays.hits.bytes()), 0);
         if (each == &renderer) {
           of_device = each->fetch(kAll, {});
           if (size.num_pixels() > 1) expect_of_hits(arrays, each->hits(), info);
@@ -110,7 +114,8 @@ TEST_P(FrameArraysOnDevice, SmallFramesOfAllRenderersHaveTheSame) {
     }
     const FrameArrays few = renderer.fetch({.normals = true}, {});
     EXPECT_EQ(few.normals.size(), is_slow ? largest.num_rays() : 1u);
-    EXPECT_TRUE(few.picture.empty() && few.depth.empty() && few.positions.empty());
+    EXPECT_TRUE(few.picture.empty() && few.depth.empty() && few.positions.empty() &&
+                few.hits.empty());
   }
 }
 

@@ -426,9 +426,9 @@ void move_arrays(core::FrameArrays &&arrays, Frame &frame) {
 }
 
 Array<Hit> public_hits(std::span<const core::HitRecord> records,
-                       const core::CompressedVolume &volume, bool with_levels) {
+                       const core::CompressedVolume &volume, bool with_levels,
+                       core::HostMemory &memory) {
   const core::HitMap map = core::make_hit_map(core::level_infos(volume, with_levels));
-  core::HostMemory memory;
   core::HostArray<Hit> hits = memory.array<Hit>(records.size());
   core::fill_from_hits(hits, records, [&](const core::HitRecord &record) {
     Hit hit{.t = record.t};
@@ -464,7 +464,7 @@ Frame frame_of_rays(const std::vector<core::HitRecord> &hits, const core::Compre
   core::add_hit_arrays({.depth = true, .normals = true, .positions = true}, hits,
                        core::make_shade_params(volume.info, {}), &map, memory, arrays);
   move_arrays(std::move(arrays), frame);
-  frame.hits = public_hits(hits, volume, with_levels);
+  frame.hits = public_hits(hits, volume, with_levels, memory);
   return frame;
 }
 

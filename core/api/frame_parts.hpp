@@ -106,7 +106,9 @@ Array<T> public_array(core::HostArray<T> &&values) {
 /// Moves arrays that were fetched into the frame.
 void move_arrays(core::FrameArrays &&arrays, Frame &frame);
 
+/// memory: of the result
 Array<Hit> public_hits(std::span<const core::HitRecord> records,
-                       const core::CompressedVolume &volume, bool with_levels);
+                       const core::CompressedVolume &volume, bool with_levels,
+                       core::HostMemory &memory);
 
 }  // namespace isowave

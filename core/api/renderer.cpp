@@ -135,7 +135,7 @@ std::optional<std::array<double, 2>> range_of_colors(
 /// Gets what the request wants of the frame that was drawn, except bounds.
 void Renderer::Implementation::fetch(const FrameRequest &request, Frame &frame) {
   const core::WantedArrays wanted{request.want_picture, request.want_depth, request.want_normals,
-                                  request.want_positions, request.want_field};
+                                  request.want_positions, request.want_field, request.want_hits};
   const core::Appearance appearance = core_appearance(request, whole());
   const auto range = renderer_->field_range();
   frame.statistics.color_range = range_of_colors(appearance, range);
@@ -146,9 +146,11 @@ void Renderer::Implementation::fetch(const FrameRequest &request, Frame &frame) 
   }
   if (renderer_->has_field_values()) frame.statistics.field_range = range;
   // Without a picture, nothing needs colours, nor the values that they are by.
-  move_arrays(renderer_->fetch(wanted, of_last_frame(appearance, *renderer_)), frame);
+  core::FrameArrays arrays = renderer_->fetch(wanted, of_last_frame(appearance, *renderer_));
   if (request.want_hits)
-    frame.hits = public_hits(renderer_->hits(), volume_, renderer_->abilities().levels);
+    frame.hits = public_hits(std::span(arrays.hits.data(), arrays.hits.size()), volume_,
+                             renderer_->abilities().levels, memory_);
+  move_arrays(std::move(arrays), frame);
 }
 
 Frame Renderer::Implementation::cast_rays(std::span<const Ray> rays, double isovalue,

@@ -74,6 +74,7 @@ struct Renderer::Implementation {
   const core::CompressedVolume &volume_;
   std::unique_ptr<core::Renderer> renderer_;
   LastFrame last_;
+  core::HostMemory memory_;  ///< of Frame::hits
   std::atomic<std::uint64_t> memory_bytes_ = 0;
 };
 

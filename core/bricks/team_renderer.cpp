@@ -507,7 +507,7 @@ FrameArrays TeamRenderer::fetch(const WantedArrays &wanted, const Appearance &ap
     }
   }
   std::vector<HitRecord> hits;
-  if (wanted.normals) {
+  if (wanted.normals || wanted.hits) {
     hits = this->hits();
   } else if (wanted.depth) {
     constexpr HitField kDepth[] = {HitField::kT};

@@ -30,6 +30,10 @@ Image8 image_of(ImageSize size, const HostArray<std::uint8_t> &picture) {
 void add_hit_arrays(const WantedArrays &wanted, std::span<const HitRecord> hits,
                     const ShadeParams &shading, const HitMap *map, HostMemory &memory,
                     FrameArrays &arrays) {
+  if (wanted.hits) {
+    arrays.hits = memory.array<HitRecord>(hits.size());
+    fill_from_hits(arrays.hits, hits, [](const HitRecord &hit) { return hit; });
+  }
   if (wanted.depth) {
     arrays.depth = memory.array<float>(hits.size());
     fill_from_hits(arrays.depth, hits, [](const HitRecord &hit) { return hit.t; });

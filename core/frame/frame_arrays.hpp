@@ -18,6 +18,7 @@ namespace isowave::core {
 struct WantedArrays {
   bool picture = false, depth = false, normals = false, positions = false;
   bool field_values = false;  ///< of a frame with FrameRequest::field_values
+  bool hits = false;          ///< all that is known of them
 };
 
 /// Arrays of one frame; those that were not wanted are empty. Rays are [rows][columns], row 0 at
@@ -29,6 +30,7 @@ struct FrameArrays {
   HostArray<std::array<float, 3>> normals;     ///< see world_normal()
   HostArray<std::array<double, 3>> positions;  ///< see hit_position()
   HostArray<float> field_values;               ///< see field_value.h; NaN: none
+  HostArray<HitRecord> hits;                   ///< as Renderer::hits()
 };
 
 /// Throws  std::logic_error: the picture of a sample of rays (ImageSize::stride) is wanted
@@ -50,7 +52,7 @@ void fill_from_hits(HostArray<T> &values, std::span<const HitRecord> hits, const
   });
 }
 
-/// Computes depth, normals and positions on the host, by all its threads.
+/// Computes depth, normals and positions on the host, and copies hits, by all its threads.
 ///
 /// hits     [rows * columns]
 /// shading  make_shade_params(), for normals

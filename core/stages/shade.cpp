@@ -114,6 +114,10 @@ FrameArrays Shade::operator()(const WantedArrays &wanted, const Shading &shading
     arrays->field_values = memory_.array<float>(num_rays);
     rays.field_values.read(std::span(arrays->field_values.data(), num_rays));
   }
+  if (wanted.hits) {
+    arrays->hits = memory_.array<HitRecord>(num_rays);
+    rays.hits.read_async(std::span(arrays->hits.data(), num_rays), copied_);
+  }
   const bool has_doubles = HitPositions::suits(device_);
   if (wanted.positions && has_doubles) {
     copy_parts(arrays->positions, num_rays,
