@@ -16,9 +16,10 @@
 #include "device/block_pages.h"
 #include "device/block_requests.h"
 #include "device/ray_pairs.h"
+#include "device/work_group.h"
 #include "portable/label_table.h"
 
-#define ISO_SPARE_PART 16u  ///< one slot of so many may be freed beyond need
+#define ISO_SPARE_PART 8u  ///< one slot of so many may be freed beyond need
 
 ISO_INLINE uint listed_count(global const PassCounts *counts, uint capacity) {
   return min(counts->requested_count, capacity);
@@ -248,25 +249,32 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_se
 }
 
 /// Frees the selected slots. Grid-stride over slots.
-kernel void cache_evict(const FrameParams frame_params, global const PassCounts *counts,
-                        uint num_slots, global uint *slot_block_ids, global const uint *slot_stamps,
-                        global const uchar *slot_ranks, global uint *table,
-                        global CacheState *cache, global uint *free_slots) {
+kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_evict(
+    const FrameParams frame_params, global const PassCounts *counts, uint num_slots,
+    global uint *slot_block_ids, global const uint *slot_stamps, global const uchar *slot_ranks,
+    global uint *table, global CacheState *cache, global uint *free_slots) {
   const FrameParams *frame = &frame_params;
-  const uint cutoff_rank = cache->cutoff_rank;
-  if (counts->requested_count == 0) return;
-  for (uint slot = get_global_id(0); cutoff_rank < ISO_EVICTION_RANKS && slot < num_slots;
-       slot += get_global_size(0)) {
-    const uint stamp = slot_stamps[slot], block_id = slot_block_ids[slot];
-    const uint rank = slot_ranks[slot];
-    int is_victim = block_id != ISO_INVALID_ID && stamp != needed_stamp(counts->pass + 1) &&
-                    rank >= cutoff_rank;
-    if (is_victim && rank == cutoff_rank)
-      is_victim = atomic_inc(&cache->num_cutoff) < cache->cutoff_count;
+  local uint counters[2];
+  const uint item = get_local_id(0), cutoff_rank = cache->cutoff_rank;
+  const uint searched =
+      counts->requested_count != 0 && cutoff_rank < ISO_EVICTION_RANKS ? num_slots : 0;
+  if (item == 0) counters[0] = 0;
+  barrier(CLK_LOCAL_MEM_FENCE);
+  for (uint begin = get_global_id(0) - item; begin < searched; begin += get_global_size(0)) {
+    const uint slot = begin + item;
+    const uint block_id = slot < num_slots ? slot_block_ids[slot] : ISO_INVALID_ID;
+    const int may_go =
+        block_id != ISO_INVALID_ID && slot_stamps[slot] != needed_stamp(counts->pass + 1);
+    const uint rank = may_go ? slot_ranks[slot] : 0;
+    const int is_at_cutoff = may_go && rank == cutoff_rank;
+    const int is_taken =
+        take_place(is_at_cutoff, counters, &cache->num_cutoff) < cache->cutoff_count;
+    const int is_victim = may_go && (rank > cutoff_rank || (is_at_cutoff && is_taken));
+    const uint place = take_place(is_victim, counters, &cache->num_evicted);
     if (is_victim) {
       remove_block(frame, table, block_coords(frame, block_id));
       slot_block_ids[slot] = ISO_INVALID_ID;
-      free_slots[cache->free_before + atomic_inc(&cache->num_evicted)] = slot;
+      free_slots[cache->free_before + place] = slot;
     }
   }
 }

@@ -111,7 +111,7 @@ class CacheModel {
           first_kept = std::min(first_kept, order(slot));
       }
     }
-    ASSERT_LE(spared, num_slots / 16);
+    ASSERT_LE(spared, num_slots / 8);
     num_spared += spared;
     ASSERT_LE(last_evicted, first_kept) << "a block was evicted before one that was kept";
     ASSERT_EQ(world.counts().recycled_count, recycled);

@@ -237,9 +237,9 @@ TEST_P(MemoryPlanOfLevelsOnDevice, PeakOfSetupIsPlanned) {
 
 TEST(MemoryPlan, FirstSlotsAreForWhatAFrameNeeds) {
   constexpr std::uint64_t kRays = 1280 * 720;
-  EXPECT_EQ(first_cache_slots(128 * 128 * 128, kRays), 8u * 128 * 128) << "of the volume";
-  EXPECT_EQ(first_cache_slots(256 * 256 * 256, kRays), kRays / 2) << "of the picture";
-  EXPECT_EQ(first_cache_slots(128 * 128 * 128, kRays, true), 20u * 128 * 128) << "and of its hits";
+  EXPECT_EQ(first_cache_slots(128 * 128 * 128, kRays), 12u * 128 * 128) << "of the volume";
+  EXPECT_EQ(first_cache_slots(256 * 256 * 256, kRays), kRays / 8 * 5) << "of the picture";
+  EXPECT_EQ(first_cache_slots(128 * 128 * 128, kRays, true), 24u * 128 * 128) << "and of its hits";
   EXPECT_EQ(first_cache_slots(64 * 64 * 64, 800), 16'384u) << "not worth saving";
   EXPECT_EQ(first_cache_slots(16'384, kRays), 16'384u) << "all";
   EXPECT_EQ(first_cache_slots(27, kRays), 27u) << "all";
@@ -252,8 +252,8 @@ TEST(MemoryPlan, ACacheGrowsByWhatItLackedAtMostToFourTimes) {
   plan.most_slots = 3000;
   EXPECT_EQ(grown_cache_slots(plan, 0), 1600u);
   EXPECT_EQ(grown_cache_slots(plan, 50), 1600u) << "one of 32: the next frame finds enough";
-  EXPECT_EQ(grown_cache_slots(plan, 51), 1854u);
-  EXPECT_EQ(grown_cache_slots(plan, 400), 2250u) << "an eighth more than was needed";
+  EXPECT_EQ(grown_cache_slots(plan, 51), 2060u);
+  EXPECT_EQ(grown_cache_slots(plan, 400), 2500u) << "a quarter more than was needed";
   EXPECT_EQ(grown_cache_slots(plan, 100'000), 3000u) << "no more than it may";
   plan.most_slots = 10'000;
   EXPECT_EQ(grown_cache_slots(plan, 100'000), 6400u);
@@ -284,13 +284,13 @@ TEST_P(MemoryPlanOfLevelsOnDevice, DefaultIsBelowThePaperAndTheDecodedVolume) {
     GTEST_SKIP() << "a device that cannot have the largest cache";
   const MemoryPlan plan = plan_of({512, 512, 512});
   EXPECT_LE(plan.peak(), 191'000'000u);
-  EXPECT_EQ(plan.cache_slots, 131'072u);
+  EXPECT_EQ(plan.cache_slots, 196'608u);
   EXPECT_EQ(plan.most_slots, kAmpleCacheSlots);
   EXPECT_TRUE(plan.can_grow());
   EXPECT_LE(plan_of({256, 256, 256}).peak(), 256u * 256 * 256 * 4) << "with fewer slots";
   EXPECT_GE(plan_of({256, 256, 256}).cache_slots, 24'576u) << "but not with too few";
   request.num_rays = 1920 * 1080;
-  EXPECT_EQ(plan_of({256, 256, 256}).cache_slots, 32'768u) << "the picture alone has more bytes";
+  EXPECT_EQ(plan_of({256, 256, 256}).cache_slots, 49'152u) << "the picture alone has more bytes";
 }
 
 /// What growing makes of a plan is what would have been planned.

@@ -17,8 +17,9 @@ namespace {
 /// Caches with fewer slots may run out of slots within one pass, unless they are made for the
 /// blocks that a frame needs (MemoryPlan::can_grow()), or for all blocks.
 constexpr std::uint32_t kSmallCache = 1u << 16;
-/// Slots are scarce if fewer than one of so many are free.
-constexpr std::uint32_t kScarcePart = 8;
+/// Slots are scarce if fewer than one of so many are free: half of what is freed at a time
+/// (ISO_SPARE_PART), so that most passes free none.
+constexpr std::uint32_t kScarcePart = 16;
 
 /// If a frame has freed more slots than these of blocks that it had requested, the blocks that are
 /// left do not help the next frame: a ray waits once for each of its blocks that is gone. On a GPU,

@@ -29,16 +29,14 @@ constexpr std::uint64_t kWindowBytes = 2u << 20;
 /// for every two rays, and most again in the next frame.
 constexpr std::uint64_t kRaysPerUsefulSlot = 8;
 
-/// Slots per n^2 for a volume of n^3 blocks, whose surface is in about n^2 of them. In pipeline
-/// `rays`, a cold frame of the mixing layer decodes 6 n^2 blocks, and 7 n^2 slots are as fast as 12
-/// (bench/h100.md). Turbulence has 11 n^2, and the cache grows.
-constexpr double kSlotsPerFace = 8;
-/// A small picture needs a smaller cache: at most a slot for so many rays.
-constexpr std::uint64_t kRaysPerSlot = 2;
-/// A cache begins with as little as three quarters if that keeps the plan below the decoded volume.
-constexpr std::uint64_t kLeastQuarters = 3;
-/// Rays that go on from the camera's hits need so many times as many slots: five halves.
-constexpr std::uint64_t kHalvesWithFurtherRays = 5;
+/// Slots per n^2 for a volume of n^3 blocks, whose surface is in about n^2 of them. A cold frame of
+/// turbulence decodes 6 n^2 blocks in pipeline `rays`, at 256^3 voxels and at 1024^3, and 9.6 n^2
+/// in pipeline `blocks`, which requests whole dual grids (bench/h100.md).
+constexpr double kSlotsPerFace = 12;
+/// A small picture needs a smaller cache: at most 5 slots per 8 rays.
+constexpr std::uint64_t kRaysPerSlot = 8, kSlotsOfThose = 5;
+/// A cache begins with as little as half if that keeps the plan below the decoded volume.
+constexpr std::uint64_t kLeastPart = 2;
 /// Least initial size of a cache, 2^14 slots (5.3 MB), or all blocks if there are fewer: a frame of
 /// a small noisy volume needs most of its blocks.
 constexpr std::uint64_t kFewSlots = 1 << 14;
@@ -148,8 +146,8 @@ std::uint32_t first_cache_slots(std::uint64_t num_blocks, std::uint64_t num_rays
   const double edge = std::cbrt(double(num_blocks));
   const std::uint64_t wanted =
       std::min(static_cast<std::uint64_t>(std::llround(kSlotsPerFace * edge * edge)),
-               num_rays / kRaysPerSlot) *
-      (with_further_rays ? kHalvesWithFurtherRays : 2) / 2;
+               num_rays * kSlotsOfThose / kRaysPerSlot) *
+      (with_further_rays ? 2 : 1);
   const std::uint64_t slots = std::min(std::max(wanted, kFewSlots), num_blocks);
   return static_cast<std::uint32_t>(
       std::clamp<std::uint64_t>(slots, kMinCacheSlots, ISO_MAX_CACHE_SLOTS));
@@ -159,7 +157,7 @@ std::uint32_t grown_cache_slots(const MemoryPlan &plan, std::uint64_t recycled) 
   const std::uint64_t slots = plan.cache_slots;
   if (!plan.can_grow() || recycled <= slots / kSparePart) return plan.cache_slots;
   // Blocks may have been freed and requested again and again, and count as often.
-  const std::uint64_t wanted = std::min((slots + recycled) / 8 * 9, kMostGrowth * slots);
+  const std::uint64_t wanted = std::min((slots + recycled) / 4 * 5, kMostGrowth * slots);
   return static_cast<std::uint32_t>(std::min<std::uint64_t>(wanted, plan.most_slots));
 }
 
@@ -341,7 +339,7 @@ MemoryPlan plan_to_grow(const ocl::Device &device, const CompressedVolume &volum
   MemoryPlan plan = plan_of(first);
   const std::uint64_t decoded = slot_bytes(plan.limits.cache.slot_type) * volume.block_count();
   if (first_slots == 0 && plan.total() > decoded) {  // bytes grow linearly with the slots
-    const std::uint64_t slots = plan.cache_slots, least = std::max(slots / 4 * kLeastQuarters, kFewSlots);
+    const std::uint64_t slots = plan.cache_slots, least = std::max(slots / kLeastPart, kFewSlots);
     const MemoryPlan smaller = plan_of(least);
     if (least < slots && smaller.total() < decoded)
       plan = plan_of(least + (slots - least) * (decoded - smaller.total()) /

@@ -98,10 +98,10 @@ struct MemoryPlan {
 /// The plan of the same renderer once its cache has so many slots.
 MemoryPlan resized(MemoryPlan plan, std::uint32_t cache_slots);
 
-/// Initial number of slots of a cache that may grow: a third more than the blocks of a frame in most
-/// volumes. More with rays that come to more blocks than the camera's to their first hits: ambient
-/// rays, and those behind translucent surfaces. A cache that grows for them makes the second frame a
-/// cold one.
+/// Initial number of slots of a cache that may grow: twice the blocks that a frame needs in most
+/// volumes, so that the next frame finds free slots. Twice that with rays that come to more blocks
+/// than the camera's to their first hits: ambient rays, and those behind translucent surfaces. A
+/// cache that grows for them makes the second frame a cold one.
 std::uint32_t first_cache_slots(std::uint64_t num_blocks, std::uint64_t num_rays,
                                 bool with_further_rays = false);
 
@@ -145,8 +145,8 @@ MemoryPlan plan_within(const ocl::Device &device, const CompressedVolume &volume
                        const MemoryRequest &request, std::uint64_t budget, std::uint32_t max_slots);
 
 /// A plan that can grow to as many slots as plan_within() gives. It begins with first_slots, or if
-/// that is 0 with first_cache_slots(), or with as little as three quarters of these if that keeps it
-/// below the decoded volume.
+/// that is 0 with first_cache_slots(), or with as little as half of these if that keeps it below
+/// the decoded volume.
 ///
 /// budget, max_slots, Throws  as plan_within()
 MemoryPlan plan_to_grow(const ocl::Device &device, const CompressedVolume &volume,

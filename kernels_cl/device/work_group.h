@@ -46,22 +46,29 @@ ISO_INLINE uint scan_table(local uint *sums, global uint *values, uint count) {
   return carry;
 }
 
+/// Counts the work-items with `takes`, and gives each of these a place of its own behind those that
+/// were counted before. All items of the work-group must call it.
+///
+/// counters  [2] of the work-group; counters[0]: 0 before and after
+ISO_INLINE uint take_place(int takes, volatile local uint *counters, volatile global uint *count) {
+  uint place = 0;
+  if (takes) place = atomic_inc(&counters[0]);
+  barrier(CLK_LOCAL_MEM_FENCE);
+  if (get_local_id(0) == 0 && counters[0] != 0) counters[1] = atomic_add(count, counters[0]);
+  barrier(CLK_LOCAL_MEM_FENCE);
+  if (takes) place += counters[1];
+  barrier(CLK_LOCAL_MEM_FENCE);
+  if (get_local_id(0) == 0) counters[0] = 0;
+  barrier(CLK_LOCAL_MEM_FENCE);
+  return place;
+}
+
 /// Appends an entry to list [*count]. All items must call it. Returns its place.
 /// goes_on: this work-item has one. counters [2] of the work-group: 0 on entry and on return.
 ISO_INLINE uint append_entry(int goes_on, uint entry, volatile local uint *counters,
                              volatile global uint *count, global uint *list) {
-  uint place = 0;
-  if (goes_on) place = atomic_inc(&counters[0]);
-  barrier(CLK_LOCAL_MEM_FENCE);
-  if (get_local_id(0) == 0 && counters[0] != 0) counters[1] = atomic_add(count, counters[0]);
-  barrier(CLK_LOCAL_MEM_FENCE);
-  if (goes_on) {
-    place += counters[1];
-    list[place] = entry;
-  }
-  barrier(CLK_LOCAL_MEM_FENCE);
-  if (get_local_id(0) == 0) counters[0] = 0;
-  barrier(CLK_LOCAL_MEM_FENCE);
+  const uint place = take_place(goes_on, counters, count);
+  if (goes_on) list[place] = entry;
   return place;
 }
 
