@@ -17,8 +17,8 @@ struct Known {
   double angle, sine, cosine, tangent, arc_tangent;
 };
 
-/// By 113 bits (libquadmath), rounded. The first two are angles of views from the corner; glibc 2.36
-/// has another sine or tangent of the last three.
+/// By 113 bits (libquadmath), rounded. The first two are angles of views from the corner;
+/// glibc 2.36 has another sine or tangent of the last three.
 constexpr std::array<Known, 13> kKnown = {{
     {0x1.657184ae74487p-2, 0x1.5e3a8748a0bf5p-2, 0x1.e11f642522d1cp-1, 0x1.74b49cf3902d4p-2,
      0x1.57e7101b22948p-2},
