@@ -96,6 +96,10 @@ if [ -n "$volumes" ]; then
   quietly cmake --build "$work/native_user"
   while read -r file isovalue; do
     same_bits WebAssembly 14 "$file" "$isovalue"
-  done <<< "$volumes"
+  done << END
+$source/tests/data/fuel_64x33x32_uint8.raw.gz 10
+$source/tests/data/head_41x41x41_uint8.raw.gz 90
+$volumes
+END
   echo "WebAssembly: $num_volumes volumes"
 fi
