@@ -345,6 +345,11 @@ def test_the_poster_has_the_annotations(volume: isowave.Volume, tmp_path: Path) 
     assert np.array_equal(poster_of(tmp_path / "a.html"), expected)
     scene.save_site(tmp_path / "site")
     assert np.array_equal(poster_of(tmp_path / "site/index.html"), expected)
+    # As the viewer's button does it.
+    scene.save(tmp_path / "s.json")
+    fields = _core.parse_scene((tmp_path / "s.json").read_text())
+    volume.save_page(fields, tmp_path / "v.html", "Of the viewer", None)
+    assert np.array_equal(poster_of(tmp_path / "v.html"), expected)
     # Without a title, that of the page.
     scene.annotate("caption").save_html(tmp_path / "b.html", title="Fuel, burning")
     expected = image.annotated("caption", title="Fuel, burning")
