@@ -12,11 +12,8 @@
 namespace isowave::core {
 namespace {
 
-using std::chrono_literals::operator""ms;
-using std::chrono_literals::operator""s;
-
 /// Long enough for any machine. A test that has to wait so long fails.
-constexpr auto kEver = 60s;
+constexpr std::chrono::seconds kEver{60};
 
 TEST(WaitWhile, ReturnsAtOnceIfTheValueIsAnother) {
   const std::atomic<bool> state = true;
@@ -27,6 +24,7 @@ TEST(WaitWhile, AllThatSleepAreWoken) {
   std::atomic<unsigned char> state = 1;
   std::atomic<int> num_looking = 0;
   std::vector<std::future<void>> sleepers;
+  sleepers.reserve(4);
   for (int i = 0; i < 4; ++i) {
     sleepers.push_back(std::async(std::launch::async, [&] {
       sleep_until(&state, [&] {
@@ -57,7 +55,8 @@ TEST(WaitWhile, IsWokenByWhatCameBetweenLookAndSleep) {
           wake_sleepers(&state);
         });
         while (!is_waking) std::this_thread::yield();
-        std::this_thread::sleep_for(50ms);  // time for a waker that does not wait for the sleep
+        std::this_thread::sleep_for(
+            std::chrono::milliseconds(50));  // time for a waker that does not wait for the sleep
       }
       return is_over;
     });
