@@ -348,7 +348,7 @@ def test_the_poster_has_the_annotations(volume: isowave.Volume, tmp_path: Path) 
     # As the viewer's button does it.
     scene.save(tmp_path / "s.json")
     fields = _core.parse_scene((tmp_path / "s.json").read_text())
-    volume.save_page(fields, tmp_path / "v.html", "Of the viewer", None)
+    volume.save_page(fields, tmp_path / "v.html", "A view", None)
     assert np.array_equal(poster_of(tmp_path / "v.html"), expected)
     # Without a title, that of the page.
     scene.annotate("caption").save_html(tmp_path / "b.html", title="Fuel, burning")
