@@ -21,19 +21,8 @@ quietly() { # quietly COMMAND...
   "$@" > "$work/log" 2>&1 || { cat "$work/log"; fail "$1 fails"; }
 }
 
-# run_there PROGRAM ARGUMENT...: once more if it never ends. Under Wine 8, some do not: one thread
-# is left, which waits in NtWaitForMultipleObjects().
-run_there() {
-  local limit=0 status=0
-  [ "$system" != windows ] || limit=240
-  for _ in 1 2 3; do
-    status=0
-    timeout "$limit" "$build/run" "$@" || status=$?
-    [ "$status" = 124 ] || return "$status"
-    echo "$1 did not end in $limit s" >> "$work/stuck"
-  done
-  return 124
-}
+# shellcheck source=tests/same_bits.sh
+. "$source/tests/same_bits.sh"
 
 missing=$("$source/tools/cross" --missing "$system")
 if [ -n "$missing" ]; then
@@ -68,51 +57,23 @@ compile_user "$work/native_user" -DCMAKE_PREFIX_PATH="$work/prefix"
 # both NAME FILE ISOVALUE: runs library and program of one system in the current folder
 both() {
   local run=() user_here=$work/native_user/host_only program_here=$program
-  if [ "$1" = there ]; then run=(run_there) user_here=$user program_here=$there; fi
+  if [ "$1" = there ]; then run=("$build/run") user_here=$user program_here=$there; fi
   quietly "${run[@]}" "$user_here" "$2" "$3" . 10
   quietly "${run[@]}" "$program_here" convert "$2" --rate 6 --levels all -o lossy.zfp
   quietly "${run[@]}" "$program_here" render lossy.zfp -i "$3" --size 160x90 --device host \
     --voxel-pixels 2 --samples 2 --ambient 2 --normals cell --depth lossy.npy -o lossy.png
 }
 
-num_volumes=0
-same_bits() { # same_bits FILE ISOVALUE
-  rm -rf "$work/here" "$work/there"
-  mkdir "$work/here" "$work/there"
-  (cd "$work/here" && both here "$@")
-  (cd "$work/there" && both there "$@")
-  local file count=0
-  for file in "$work"/here/*; do
-    cmp "$file" "$work/there/$(basename "$file")" ||
-      fail "$1: $(basename "$file") of $system is another"
-    count=$((count + 1))
-  done
-  [ "$count" -eq 17 ] || fail "$1: $count files, not 17"
-  [ "$(stat -c %s "$work/here/hits")" -eq $((10 * 320 * 180 * 49)) ] || fail "$1: not ten views"
-  num_volumes=$((num_volumes + 1))
-  echo "same bits: $(basename "$1")"
-}
-
-same_bits "$source/tests/data/fuel_64x33x32_uint8.raw.gz" 10
-same_bits "$source/tests/data/head_41x41x41_uint8.raw.gz" 90
+same_bits "$system" 17 "$source/tests/data/fuel_64x33x32_uint8.raw.gz" 10
+same_bits "$system" 17 "$source/tests/data/head_41x41x41_uint8.raw.gz" 90
+volumes=$(real_volumes) || fail "$volumes"
 while read -r file isovalue; do
-  if [ -e "${ISOWAVE_VOLUMES-}/$file" ]; then same_bits "$ISOWAVE_VOLUMES/$file" "$isovalue"; fi
-done << 'END'
-nucleon_41x41x41_uint8.raw.gz 100
-nucleon.nrrd 50
-vessel_tree_noisy_101x101x101_uint8.raw.gz 120
-isabel_velmag_t33_125x125x25_float32.raw.gz 25
-LIDC2.mha 120
-ch2.nii.gz 90
-cthead_256x256x113_uint16.raw.gz 800
-engine_256x256x128_uint8.raw.gz 100
-aneurism_256x256x256_uint8.raw.gz 80
-bonsai_256x256x256_uint8.raw.gz 40
-END
+  [ -z "$file" ] || same_bits "$system" 17 "$file" "$isovalue"
+done <<< "$volumes"
 
 cd "$work"
 one_line() { # one_line ARGUMENT...: both programs fail, and say so in the same line
-  if run_there "$there" "$@" > out 2> error; then fail "no error: $*"; fi
+  if "$build/run" "$there" "$@" > out 2> error; then fail "no error: $*"; fi
   if "$program" "$@" > out 2> expected; then fail "no error: $*"; fi
   [ "$(wc -l < error)" = 1 ] || { cat error; fail "an error of $(wc -l < error) lines: $*"; }
   diff expected error || fail "another error: $*"
@@ -131,10 +92,9 @@ one_line render "$fuel" -i 10 -o missing/picture.png
 folder='with blanks, ä, 漢 and 🫖'
 mkdir "$folder"
 cp "$fuel" "$folder/a b_64x33x32_uint8.raw.gz"
-quietly run_there "$there" convert "$folder/a b_64x33x32_uint8.raw.gz" -o "$folder/c d.zfp"
+quietly "$build/run" "$there" convert "$folder/a b_64x33x32_uint8.raw.gz" -o "$folder/c d.zfp"
 quietly "$program" convert "$fuel" -o native.zfp
 cmp native.zfp "$folder/c d.zfp" || fail 'a file whose name has blanks and other letters is another'
 one_line info "$folder/e f.zfp"
 [ "$(find "$folder" -name '.isowave*')" = '' ] || fail 'a temporary file is left'
-[ ! -e "$work/stuck" ] || cat "$work/stuck"
 echo "$system: $num_volumes volumes"

@@ -358,35 +358,37 @@ TEST(HostBlocks, AnErrorOfTheWorkEndsIt) {
               testing::ThrowsMessage<Error>("my own"));
 }
 
-/// Value ranges of parts of blocks, whole ones and those at the volume's end.
+/// Value ranges of parts of blocks, whole ones and those at the volume's end; without the voxels
+/// that have no data.
 TEST(HostLoops, RangesOfParts) {
   const glm::uvec3 dims(9, 10, 11);
   const TestVolume volume(dims, test::noise_field(8), 12);
   const CompressedVolume &compressed = volume.compressed;
-  for (const HostLoops &loops : all_host_loops()) {
+  const auto check = [&](const HostLoops &loops, std::uint64_t no_data) {
     for_each_block(compressed.num_blocks(), [&](const glm::uvec3 &block, std::size_t id) {
       const glm::uvec3 begin = 4u * block, size = glm::min(dims - begin, 4u);
       BlockRange parts[8];
       loops.ranges({compressed.words.data(), compressed.block_begin(id), compressed.block_bits(id),
-                    compressed.precision.min_exponent, 1, 0, size.x, size.y, size.z, 0},
+                    compressed.precision.min_exponent, 1, 0, size.x, size.y, size.z, no_data},
                    parts);
       for (std::uint32_t part = 0; part < 8; ++part) {
-        const glm::uvec3 end =
-            begin + glm::uvec3((part & 1) != 0 ? 1 : size.x, (part & 2) != 0 ? 1 : size.y,
-                               (part & 4) != 0 ? 1 : size.z);
+        const glm::uvec3 end((part & 1) != 0 ? 1 : size.x, (part & 2) != 0 ? 1 : size.y,
+                             (part & 4) != 0 ? 1 : size.z);
         float low = INFINITY, high = -INFINITY;
-        for (std::uint32_t z = begin.z; z < end.z; ++z) {
-          for (std::uint32_t y = begin.y; y < end.y; ++y) {
-            for (std::uint32_t x = begin.x; x < end.x; ++x) {
-              low = std::min(low, volume.voxel(x, y, z));
-              high = std::max(high, volume.voxel(x, y, z));
-            }
-          }
-        }
-        EXPECT_EQ(parts[part].min, low) << id << ", part " << part;
-        EXPECT_EQ(parts[part].max, high) << id << ", part " << part;
+        for_each_block(end, [&](const glm::uvec3 &at, std::size_t) {
+          if ((no_data >> (at.x + 4 * at.y + 16 * at.z) & 1u) != 0) return;
+          const glm::uvec3 voxel = begin + at;
+          low = std::min(low, volume.voxel(voxel.x, voxel.y, voxel.z));
+          high = std::max(high, volume.voxel(voxel.x, voxel.y, voxel.z));
+        });
+        EXPECT_EQ(parts[part].min, low) << id << ", part " << part << ", no data " << no_data;
+        EXPECT_EQ(parts[part].max, high) << id << ", part " << part << ", no data " << no_data;
       }
     });
+  };
+  for (const HostLoops &loops : all_host_loops()) {
+    for (const std::uint64_t no_data : {0ull, 1ull, 0x1111ull, 0x8000'0421'1234'000Full, ~0ull})
+      check(loops, no_data);
   }
 }
 

@@ -34,6 +34,7 @@ using core::test::read_file;
 using core::test::run_isowave;
 using core::test::TemporaryFolder;
 using core::test::write_file;
+using testing::Each;
 using testing::HasSubstr;
 
 constexpr const char *kFuelFile = ISOWAVE_TEST_DATA "/fuel_64x33x32_uint8.raw.gz";
@@ -93,6 +94,37 @@ TEST(Page, HoldsTheVolumeTheSceneAndItsPicture) {
   const std::vector<std::uint8_t> png = encode_png(renderer.render(request));
   EXPECT_EQ(decoded(between(page, "[", "]")), std::string(png.begin(), png.end()));
   EXPECT_EQ(folder.num_files(), 3u) << "a temporary file is left";
+}
+
+TEST(Page, TheCallerAnnotatesThePicture) {
+  const TemporaryFolder folder;
+  const auto volume = public_volume();
+  Scene scene{.surfaces = {{.isovalue = 10}}};
+  scene.annotations = Annotations{.scale_bar = true, .caption = true, .units = "mm"};
+  std::vector<AnnotationGroup> groups;
+  PageOptions options{.engine = write_engine(folder, kPlaces), .title = "Fuel"};
+  options.poster = {200, 150};
+  options.annotate = [&](Frame &frame, const std::vector<AnnotationGroup> &given) {
+    groups = given;
+    std::ranges::fill(frame.picture, std::uint8_t{7});
+  };
+  save_page(volume, scene, folder / "page.html", options);
+  ASSERT_EQ(groups.size(), 2u);
+  EXPECT_THAT(groups[0].texts.at(0).text, HasSubstr("mm"));
+  EXPECT_EQ(groups[1].texts.at(0).text, "Fuel");
+  write_file(folder / "page.png", decoded(between(read_file(folder / "page.html"), "[", "]")));
+  EXPECT_THAT(core::read_png(folder / "page.png").pixels, Each(7));
+
+  groups.clear();
+  save_site(volume, scene, folder / "site", options);
+  EXPECT_EQ(groups.size(), 2u);
+  groups.clear();
+  options.poster = {199, 150};  // without room
+  save_page(volume, scene, folder / "page.html", options);
+  options.poster = {200, 150};
+  scene.annotations.reset();
+  save_page(volume, scene, folder / "page.html", options);
+  EXPECT_TRUE(groups.empty());
 }
 
 TEST(Page, HoldsTheSecondVolume) {
@@ -232,6 +264,29 @@ TEST_F(CliExport, OneIsovalueOrAScene) {
   ASSERT_EQ(run_isowave("export " + in("v.zfp") + engine() + " -o " + in("c.html")).status, 0);
   EXPECT_EQ(decoded(between(read_file(folder_ / "c.html"), "(", ")")),
             read_file(folder_ / "v.zfp"));
+}
+
+TEST_F(CliExport, ThePictureIsThatOfRenderWithItsAnnotations) {
+  write_file(folder_ / "s.json",
+             R"({"isowave_scene": 1, "surfaces": [{"isovalue": 20}], "annotations":
+                 {"scale_bar": true, "axes": true, "caption": true, "units": "mm"}})");
+  const std::string scene = std::string(" ") + kFuelFile + " --scene " + in("s.json");
+  const auto drawn =
+      run_isowave("render" + scene + " --fit surface --device host -o " + in("a.png"));
+  if (drawn.err.find("built without Cairo") != drawn.err.npos) GTEST_SKIP() << drawn.err;
+  ASSERT_EQ(drawn.status, 0) << drawn.err;
+  const core::Image8 expected = core::read_png(folder_ / "a.png");
+  ASSERT_EQ(run_isowave("export" + scene + engine() + " -o " + in("a.html")).status, 0);
+  ASSERT_EQ(run_isowave("export" + scene + engine() + " --site " + in("site")).status, 0);
+  for (const char *page : {"a.html", "site/index.html"}) {
+    write_file(folder_ / "b.png", decoded(between(read_file(folder_ / page), "[", "]")));
+    EXPECT_TRUE(core::read_png(folder_ / "b.png").pixels == expected.pixels) << page;
+  }
+  ASSERT_EQ(run_isowave("render" + scene + " --fit surface --device host --annotate none -o " +
+                        in("a.png"))
+                .status,
+            0);
+  EXPECT_FALSE(core::read_png(folder_ / "a.png").pixels == expected.pixels);
 }
 
 TEST_F(CliExport, ASiteHasAPageAndTheVolumeInChunks) {

@@ -1,7 +1,9 @@
 #!/usr/bin/env bash
 # rooms_test.sh <source folder>: the table of core/README.md names every room of core/, and no room
 # includes a header of a room below it in the table. kernels_cl/portable includes nothing but
-# itself. Only core/platform calls the system. The tests that core/README.md names are there.
+# itself. Only core/platform calls the system. Threads wait by core/base/wait_while.hpp alone, and
+# functions of angles are those of core/view/trigonometry.hpp. The tests that core/README.md names
+# are there.
 set -euo pipefail
 cd "$1"
 
@@ -54,6 +56,14 @@ while read -r line; do
   fail "$line: only core/platform calls the system"
 done < <(grep -rnE "$calls" core tools --include=*.?pp |
   grep -vE '^(core/platform/|tools/python/[a-z]+\.[ch]pp:)')
+while read -r line; do
+  fail "$line: std::atomic::wait() may wait for ever; core/base/wait_while.hpp does not"
+done < <(grep -rnE '\.notify_(all|one)\(' core --include=*.?pp |
+  grep -v '^core/base/wait_while.cpp:')
+while read -r line; do
+  fail "$line: the last bit differs on other systems; core/view/trigonometry.hpp has the same"
+done < <(grep -rnE '\b(std::a?(sin|cos|tan2?)|glm::(angleAxis|rotate))\(' core --include=*.?pp |
+  grep -vE '^core/(view/trigonometry|sources/[a-z_]+)\.cpp:')
 while IFS=. read -r suite name; do
   grep -qE "^TEST(_F|_P)?\\($suite, $name\\)" tests/*_test.cpp ||
     fail "core/README.md: there is no test $suite.$name"

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "core/base/error.hpp"
+#include "core/base/wait_while.hpp"
 
 namespace isowave::core {
 namespace {
@@ -87,7 +88,7 @@ class SoonRendererTest : public testing::Test {
             .make =
                 [this](const std::stop_token &stop) {
                   const std::stop_callback wake(stop, [this] { release(); });
-                  may_make_.wait(false);
+                  wait_while(may_make_, false);
                   if (stop.stop_requested()) throw Error("stopped");
                   return std::make_shared<FakeRenderer>(with_levels(), 2, num_ready_);
                 },
@@ -97,10 +98,7 @@ class SoonRendererTest : public testing::Test {
                 [this] { return std::make_unique<FakeRenderer>(Abilities{}, 1, num_meanwhile_); }};
   }
   /// Lets the other renderer be made.
-  void release() {
-    may_make_ = true;
-    may_make_.notify_all();
-  }
+  void release() { set_and_wake(may_make_, true); }
   void make_ready(const SoonRenderer &renderer) {
     release();
     renderer.wait();

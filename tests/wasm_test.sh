@@ -2,6 +2,9 @@
 # wasm_test.sh <source folder> <build folder> <program>: the library that tools/wasm builds reads,
 # compresses, draws and extracts under node with the bits of the program, which does so on a device.
 # A page's engine draws rows and pictures with them.
+#
+# ISOWAVE_VOLUMES names a folder with further volumes (tools/test-volumes). This system's library
+# draws them, too, from ten sides.
 set -euo pipefail
 source=$1 build=$2 program=$3
 work=$(mktemp -d)
@@ -15,6 +18,9 @@ fail() {
 quietly() { # quietly COMMAND...
   "$@" > "$work/log" 2>&1 || { cat "$work/log"; fail "$1 fails"; }
 }
+
+# shellcheck source=tests/same_bits.sh
+. "$source/tests/same_bits.sh"
 
 # Only what has changed since the last run is built.
 export NODE_PATH=/usr/share/nodejs
@@ -30,7 +36,7 @@ host_only=("${node[@]}" "$work/user/host_only.js")
 relaxed=--experimental-wasm-relaxed-simd
 [[ $(node --v8-options) != *$relaxed* ]] || node+=("$relaxed")
 
-same_bits() { # same_bits VOLUME ISOVALUE
+same_as_device() { # same_as_device VOLUME ISOVALUE
   local volume=$source/tests/data/$1 isovalue=$2
   rm -rf "$work/wasm" "$work/native"
   mkdir "$work/wasm" "$work/native"
@@ -68,10 +74,32 @@ same_picture $fuel -i 10 --parallel
 quietly "$program" convert "$source/tests/data/head_41x41x41_uint8.raw.gz" -o "$work/head.zfp"
 same_picture --field "$work/head.zfp" $fuel -i 10 --color-by "$work/head.zfp,20,200"
 
-same_bits fuel_64x33x32_uint8.raw.gz 10
-same_bits head_41x41x41_uint8.raw.gz 90
+same_as_device fuel_64x33x32_uint8.raw.gz 10
+same_as_device head_41x41x41_uint8.raw.gz 90
 
 if "${host_only[@]}" missing.nrrd 10 "$work" 2> "$work/error"; then
   fail 'a missing file is no error'
 fi
 [ "$(wc -l < "$work/error")" = 1 ] || fail "an error of $(wc -l < "$work/error") lines"
+
+# both here|there FILE ISOVALUE: draws with one system's library in the current folder
+both() {
+  local user=("$work/native_user/host_only")
+  [ "$1" = here ] || user=("${host_only[@]}")
+  quietly "${user[@]}" "$2" "$3" . 10
+}
+volumes=$(real_volumes) || fail "$volumes"
+if [ -n "$volumes" ]; then
+  quietly cmake --install "$(dirname "$build")" --prefix "$work/prefix"
+  quietly cmake -G Ninja -S "$source/tests/host_only" -B "$work/native_user" \
+    -DCMAKE_BUILD_TYPE=Release -DCMAKE_PREFIX_PATH="$work/prefix"
+  quietly cmake --build "$work/native_user"
+  while read -r file isovalue; do
+    same_bits WebAssembly 14 "$file" "$isovalue"
+  done << END
+$source/tests/data/fuel_64x33x32_uint8.raw.gz 10
+$source/tests/data/head_41x41x41_uint8.raw.gz 90
+$volumes
+END
+  echo "WebAssembly: $num_volumes volumes"
+fi

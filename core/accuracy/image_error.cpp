@@ -15,6 +15,7 @@
 #include "core/base/error.hpp"
 #include "core/base/ms_since.hpp"
 #include "core/view/detail.hpp"
+#include "core/view/trigonometry.hpp"
 
 namespace isowave::core {
 
@@ -230,7 +231,7 @@ Camera camera_of(const Tile &tile, const Camera &camera, ImageSize size) {
   Camera part = camera;
   part.at = point_of_ray(camera, middle, size.height, glm::length(camera.at - camera.eye));
   part.up = axes_of(camera).up;
-  part.fovy_deg = glm::degrees(2 * std::atan(std::tan(glm::radians(camera.fovy_deg) / 2) * share));
+  part.fovy_deg = glm::degrees(2 * arc_tangent(tangent(glm::radians(camera.fovy_deg) / 2) * share));
   return part;
 }
 

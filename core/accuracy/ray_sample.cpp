@@ -5,6 +5,7 @@
 #include <glm/glm.hpp>
 #include <numbers>
 
+#include "core/view/trigonometry.hpp"
 #include "kernels_cl/portable/grid_dda.h"
 
 namespace isowave::core {
@@ -78,7 +79,7 @@ std::vector<Camera> cameras_beside(const Camera &camera, std::uint32_t height, d
   for (const double by : {pixels, pixels / 2}) {
     for (int i = 0; i < kDirections; ++i) {
       const double angle = 2 * std::numbers::pi / kDirections * i;
-      cameras.push_back(aside(camera, by * glm::dvec2(std::cos(angle), std::sin(angle)), height));
+      cameras.push_back(aside(camera, by * glm::dvec2(cosine(angle), sine(angle)), height));
     }
   }
   return cameras;

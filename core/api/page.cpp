@@ -124,19 +124,33 @@ std::shared_ptr<const Volume> second_volume(const Scene &scene, const PageOption
   return options.field;
 }
 
+std::string title_of(const Scene &scene, const PageOptions &options) {
+  const std::string title =
+      options.title.empty() ? scene.volume.filename().string() : options.title;
+  return title.empty() ? "Volume" : title;
+}
+
 /// The picture of a page's scene, which gets a camera if it has none.
 ///
 /// field  null: the volume
 std::vector<std::uint8_t> draw_poster(const std::shared_ptr<const Volume> &volume,
                                       const std::shared_ptr<const Volume> &field, Scene &scene,
-                                      ImageSize size) {
+                                      const PageOptions &options) {
+  const ImageSize size = options.poster;
   Renderer renderer =
       make_host_renderer(volume, {.field = field ? field : volume, .largest = size});
   FrameRequest request = scene_request(scene);
   if (!scene.camera) scene.camera = request.camera = renderer.camera(scene.surfaces, size);
   request.size = size;
   request.appearance.transparent = false;  // as the page shows it
-  return encode_png(renderer.render(request));
+  Frame frame = renderer.render(request);
+  if (scene.annotations && options.annotate && has_room_for_annotations(size)) {
+    Annotations wanted = *scene.annotations;
+    if (wanted.title.empty()) wanted.title = title_of(scene, options);
+    const FrameStatistics &of = frame.statistics;
+    options.annotate(frame, annotation_layout(wanted, request, of.color_range, of.slice_range));
+  }
+  return encode_png(frame);
 }
 
 /// For the text of an element or an attribute.
@@ -196,8 +210,6 @@ void write_page(const Scene &scene, core::AtomicFile &file, const PageOptions &o
                 std::span<const std::uint8_t> poster, std::string_view connect,
                 const WriteVolume &write_volume, const WriteField &write_field) {
   const EngineParts parts = read_parts(options.engine);
-  std::string title = options.title.empty() ? scene.volume.filename().string() : options.title;
-  if (title.empty()) title = "Volume";
   Scene shown = scene;
   shown.volume.clear();
   shown.dataset.clear();
@@ -209,7 +221,7 @@ void write_page(const Scene &scene, core::AtomicFile &file, const PageOptions &o
 
   file.write(parts[0]);
   file.write(connect);
-  file.write(parts[1] + to_html(title) + parts[2]);
+  file.write(parts[1] + to_html(title_of(scene, options)) + parts[2]);
   Base64Text picture(file);
   picture.write(std::as_bytes(poster));
   picture.finish();
@@ -309,7 +321,7 @@ void save_page(const std::shared_ptr<const Volume> &volume, const Scene &scene,
     check_size(*volume, "the volume");
     if (field) check_size(*field, "the second volume");
     Scene shown = scene;
-    const std::vector<std::uint8_t> poster = draw_poster(volume, field, shown, options.poster);
+    const std::vector<std::uint8_t> poster = draw_poster(volume, field, shown, options);
     core::AtomicFile file(path);
     write_page(
         scene, file, options, poster, {}, [&] { write_as_text(*volume, path, file); },
@@ -343,7 +355,7 @@ void save_site(const std::shared_ptr<const Volume> &volume, const Scene &scene,
     const auto [page, chunks] = site_files(folder);
     NewFolder new_folder(folder);
     Scene shown = scene;
-    const std::vector<std::uint8_t> poster = draw_poster(volume, {}, shown, options.poster);
+    const std::vector<std::uint8_t> poster = draw_poster(volume, {}, shown, options);
     core::AtomicFile chunks_file(chunks), page_file(page);
     const core::ChunkFileSize size =
         write_site_volume(volume->implementation().volume, chunks_file);

@@ -6,6 +6,7 @@
 
 #include "core/base/error.hpp"
 #include "core/frame/appearance.hpp"
+#include "core/view/trigonometry.hpp"
 
 namespace isowave::core {
 
@@ -86,8 +87,9 @@ std::vector<AmbientDirection> make_ambient_directions(std::uint32_t num_rays) {
   std::vector<AmbientDirection> directions;
   for_spiral(num_rays, [&](const SpiralPoint &point) {
     const double radius = std::sqrt(point.area);
-    directions.push_back(direction_of({radius * std::cos(point.angle),
-                                       radius * std::sin(point.angle), std::sqrt(1 - point.area)}));
+    directions.push_back(
+        direction_of({radius * core::cosine(point.angle), radius * core::sine(point.angle),
+                      std::sqrt(1 - point.area)}));
   });
   return directions;
 }
@@ -98,11 +100,11 @@ std::vector<AmbientDirection> make_light_directions(const LightRays &rays) {
   const glm::dvec3 other = std::abs(light.z) < 0.5 ? glm::dvec3(0, 0, 1) : glm::dvec3(1, 0, 0);
   const glm::dvec3 u = glm::normalize(glm::cross(light, other)), v = glm::cross(light, u);
   const std::uint32_t rows = rays.num_shadow == 0 && rays.bounces ? 1 : rays.num_shadow;
-  const double height = rows == 1 ? 0 : 1 - std::cos(glm::radians(rays.angle));
+  const double height = rows == 1 ? 0 : 1 - core::cosine(glm::radians(rays.angle));
   for_spiral(rows, [&](const SpiralPoint &point) {
     const double cosine = 1 - point.area * height, sine = std::sqrt(1 - cosine * cosine);
-    directions.push_back(direction_of(cosine * light + sine * std::cos(point.angle) * u +
-                                      sine * std::sin(point.angle) * v));
+    directions.push_back(direction_of(cosine * light + sine * core::cosine(point.angle) * u +
+                                      sine * core::sine(point.angle) * v));
   });
   return directions;
 }

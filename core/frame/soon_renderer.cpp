@@ -4,6 +4,7 @@
 
 #include "core/base/error.hpp"
 #include "core/base/fork.hpp"
+#include "core/base/wait_while.hpp"
 
 namespace isowave::core {
 
@@ -17,8 +18,7 @@ void SoonRenderer::make(const std::stop_token &stop) {
   } catch (...) {
     failure_ = std::current_exception();
   }
-  is_ready_ = true;
-  is_ready_.notify_all();
+  set_and_wake(is_ready_, true);
 }
 
 bool SoonRenderer::ready_for(const FrameRequest &request) const {
@@ -33,7 +33,7 @@ bool SoonRenderer::ready_for(const FrameRequest &request) const {
 
 void SoonRenderer::wait() const {
   check_not_forked();
-  is_ready_.wait(false);
+  wait_while(is_ready_, false);
   if (failure_) std::rethrow_exception(failure_);
 }
 

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/base/parallel_for.hpp"
+#include "core/base/wait_while.hpp"
 #include "core/view/frame.hpp"
 #include "core/volume/range_thresholds.hpp"
 #include "core/zfp/block_chunks.hpp"
@@ -368,7 +369,7 @@ void HostBlocks::decode_once(std::size_t block) {
   uchar seen = state.load(std::memory_order_acquire);
   while (seen != HostField::kDecoded) {
     if (seen == kBeingMade) {
-      state.wait(kBeingMade, std::memory_order_acquire);
+      wait_while(state, kBeingMade);
       seen = state.load(std::memory_order_acquire);
       continue;
     }
@@ -379,12 +380,10 @@ void HostBlocks::decode_once(std::size_t block) {
       decode_to(block, values(block));
       seen = HostField::kDecoded;
     } catch (...) {
-      state.store(kNone, std::memory_order_release);
-      state.notify_all();
+      set_and_wake(state, kNone);
       throw;
     }
-    state.store(seen, std::memory_order_release);
-    state.notify_all();
+    set_and_wake(state, seen);
     num_decoded_.fetch_add(1, std::memory_order_relaxed);
   }
 }
@@ -417,7 +416,7 @@ void HostBlocks::find_changing(Selection &selection, std::size_t block,
   uchar seen = state.load(std::memory_order_acquire);
   while (seen != selection.number) {
     if (seen == kBeingMade) {
-      state.wait(kBeingMade, std::memory_order_acquire);
+      wait_while(state, kBeingMade);
       seen = state.load(std::memory_order_acquire);
       continue;
     }
@@ -428,8 +427,7 @@ void HostBlocks::find_changing(Selection &selection, std::size_t block,
     }
     selection.changing.items()[block] = changing_cells(inside);
     seen = selection.number;
-    state.store(seen, std::memory_order_release);
-    state.notify_all();
+    set_and_wake(state, seen);
   }
 }
 

@@ -6,6 +6,7 @@
 #include "core/base/error.hpp"
 #include "core/render/device_renderer.hpp"
 #include "core/render/picture_so_far.hpp"
+#include "core/view/detail.hpp"
 #include "kernels_cl/portable/clip.h"
 
 namespace isowave::core {

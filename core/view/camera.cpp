@@ -12,6 +12,7 @@
 
 #include "core/base/error.hpp"
 #include "core/io/json_file.hpp"
+#include "core/view/trigonometry.hpp"
 
 namespace isowave::core {
 namespace {
@@ -101,9 +102,18 @@ void check_camera(const Camera &camera, std::string_view what) {
   }
 }
 
+namespace {
+
+/// axis  of length 1
+glm::dquat turn_about(double angle, const glm::dvec3 &axis) {
+  return {cosine(angle / 2), sine(angle / 2) * axis};
+}
+
+}  // namespace
+
 Camera turned(const Camera &camera, double degrees, const std::optional<glm::dvec3> &axis) {
   const glm::dvec3 about = axis.value_or(camera.up);
-  const glm::dquat turn = glm::angleAxis(glm::radians(degrees), glm::normalize(about));
+  const glm::dquat turn = turn_about(glm::radians(degrees), glm::normalize(about));
   Camera result = camera;
   result.eye = camera.at + turn * (camera.eye - camera.at);
   if (about != camera.up) result.up = turn * camera.up;
@@ -121,8 +131,8 @@ Camera aside(const Camera &camera, const glm::dvec2 &pixels, std::uint32_t heigh
     result.at += step;
     return result;
   }
-  const glm::dquat turn = glm::angleAxis(by * pixel_size_at(camera, height, 1),
-                                         glm::normalize(glm::cross(forward, to)));
+  const glm::dquat turn =
+      turn_about(by * pixel_size_at(camera, height, 1), glm::normalize(glm::cross(forward, to)));
   result.at = camera.eye + turn * forward;
   result.up = turn * camera.up;
   return result;
@@ -139,13 +149,13 @@ glm::dvec3 point_of_ray(const Camera &camera, const glm::dvec2 &pixels, std::uin
 Camera in_parallel(const Camera &camera) {
   Camera result = camera;
   const double distance = glm::length(camera.at - camera.eye);
-  result.parallel_height = 2 * distance * std::tan(glm::radians(camera.fovy_deg) / 2);
+  result.parallel_height = 2 * distance * tangent(glm::radians(camera.fovy_deg) / 2);
   return result;
 }
 
 double pixel_size_at(const Camera &camera, std::uint32_t height, double distance) {
   if (camera.parallel_height) return *camera.parallel_height / height;
-  return distance * (2.0 * std::tan(glm::radians(camera.fovy_deg) / 2) / height);
+  return distance * (2.0 * tangent(glm::radians(camera.fovy_deg) / 2) / height);
 }
 
 namespace {
@@ -246,8 +256,8 @@ double azimuth_of(std::uint32_t view, std::uint32_t num_views) {
 
 /// From the point looked at, of length 1.
 glm::dvec3 towards_eye(const Orientation &to, double azimuth) {
-  return std::cos(kElevation) * std::sin(azimuth) * to.right + std::sin(kElevation) * to.up +
-         std::cos(kElevation) * std::cos(azimuth) * to.front;
+  return cosine(kElevation) * sine(azimuth) * to.right + sine(kElevation) * to.up +
+         cosine(kElevation) * cosine(azimuth) * to.front;
 }
 
 /// A view from a side: its `up`, and from the point looked at towards the eye, of length 1.
@@ -281,7 +291,7 @@ ViewDirection view_direction(const VolumeInfo &info, const Orientation &to, Side
 
 glm::dvec3 turned_about(const glm::dvec3 &axis, const glm::dvec3 &v, double angle) {
   const glm::dvec3 along = axis * glm::dot(axis, v);
-  return along + std::cos(angle) * (v - along) + std::sin(angle) * glm::cross(axis, v);
+  return along + cosine(angle) * (v - along) + sine(angle) * glm::cross(axis, v);
 }
 
 /// World vectors from a box's centre to its corners.
@@ -321,7 +331,7 @@ Camera camera_of_box(const VolumeInfo &info, const glm::dvec3 &begin, const glm:
   const ViewDirection first = view_direction(info, orientation, from.side);
   const glm::dvec3 centre = info.origin + info.index_to_world() * (0.5 * (begin + end));
   const std::array<glm::dvec3, 8> corners = corners_of(info, end - begin);
-  const double tan_v = std::tan(glm::radians(kFovyDeg) / 2);
+  const double tan_v = tangent(glm::radians(kFovyDeg) / 2);
   double distance = 0;
   for (std::uint32_t view = 0; view < from.num_views; ++view) {
     const double angle = 2.0 * std::numbers::pi * view / from.num_views;
@@ -341,7 +351,7 @@ Camera fitted(const Camera &camera, const VolumeInfo &info, double aspect) {
   Camera result = camera;
   result.at = info.origin + info.index_to_world() * (0.5 * size);
   double distance = distance_to_fit(corners, {-axes.forward, axes.up},
-                                    std::tan(glm::radians(camera.fovy_deg) / 2), aspect);
+                                    tangent(glm::radians(camera.fovy_deg) / 2), aspect);
   if (camera.parallel_height) {
     double half = 0, depth = 0;
     for (const glm::dvec3 &at : corners) {
@@ -360,7 +370,8 @@ Camera zoomed(const Camera &camera, double zoom) {
   if (!(zoom >= 0.01 && zoom <= 1000)) throw Error("a zoom of {}: give 0.01 to 1000", zoom);
   Camera result = camera;
   if (zoom == 1) return result;
-  result.fovy_deg = glm::degrees(2 * std::atan(std::tan(glm::radians(camera.fovy_deg) / 2) / zoom));
+  result.fovy_deg =
+      glm::degrees(2 * arc_tangent(tangent(glm::radians(camera.fovy_deg) / 2) / zoom));
   if (camera.parallel_height) result.parallel_height = *camera.parallel_height / zoom;
   return result;
 }

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "core/base/error.hpp"
+#include "core/view/trigonometry.hpp"
 #include "kernels_cl/portable/block_grid.h"
 #include "kernels_cl/portable/grid_dda.h"
 #include "kernels_cl/portable/ray_state.h"
@@ -182,7 +183,7 @@ View make_view(const VolumeInfo &info, const Camera &camera, ImageSize size) {
           .pixel_scale =
               camera.parallel_height
                   ? static_cast<float>(*camera.parallel_height / 2 / rows_of(size) / t_scale)
-                  : static_cast<float>(std::tan(glm::radians(camera.fovy_deg) / 2) / rows_of(size)),
+                  : static_cast<float>(tangent(glm::radians(camera.fovy_deg) / 2) / rows_of(size)),
           .t_scale = static_cast<float>(t_scale),
           .is_parallel = camera.parallel_height ? 1u : 0u,
           .stride = size.stride};

@@ -90,8 +90,20 @@ std::optional<isowave::Annotations> read_annotations(
   return wanted;
 }
 
+void draw_annotations(isowave::Frame &frame, const std::vector<isowave::AnnotationGroup> &groups) {
+  const std::size_t num_pixels = std::size_t{frame.size.width} * frame.size.height;
+  Image8 image{frame.size.width, frame.size.height,
+               static_cast<std::uint32_t>(frame.picture.size() / num_pixels),
+               frame.picture.to_vector()};
+  draw_annotations(image, groups);
+  std::ranges::copy(image.pixels, frame.picture.begin());
+}
+
 #ifndef ISOWAVE_HAS_CAIRO
 
+bool can_annotate() {
+  return has_annotator();
+}
 void check_annotations() {
   if (!has_annotator())
     throw Error(
@@ -106,6 +118,9 @@ void draw_annotations(Image8 &image, const std::vector<isowave::AnnotationGroup>
 
 #else
 
+bool can_annotate() {
+  return true;
+}
 void check_annotations() {}
 
 namespace {

@@ -30,11 +30,15 @@ std::optional<isowave::Annotations> read_annotations(
 
 /// Throws  Error: this program cannot draw annotations
 void check_annotations();
+/// Whether this program can.
+bool can_annotate();
 
 /// Draws over an RGB or RGBA picture; RGBA becomes opaque there. Pixels without annotations keep
 /// their values.
 ///
 /// Throws  Error: they cannot be drawn
 void draw_annotations(Image8 &image, const std::vector<isowave::AnnotationGroup> &groups);
+/// The same over a frame's picture.
+void draw_annotations(isowave::Frame &frame, const std::vector<isowave::AnnotationGroup> &groups);
 
 }  // namespace isowave::core::tools

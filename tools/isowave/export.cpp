@@ -13,6 +13,7 @@
 #include "core/base/text.hpp"
 #include "core/io/atomic_file.hpp"
 #include "isowave/page.hpp"
+#include "tools/isowave/annotate.hpp"
 #include "tools/isowave/commands.hpp"
 #include "tools/isowave/help_groups.hpp"
 #include "tools/isowave/outputs.hpp"
@@ -119,6 +120,13 @@ void run_export(const CLI::App &command, ExportArgs options) {
   }
   for (const isowave::Surface &surface : scene.surfaces) {
     if (surface.labels.empty()) warn_of_isovalue(compressed, surface.isovalue);
+  }
+  if (can_annotate()) {
+    options.page.annotate = [](Frame &frame, const std::vector<isowave::AnnotationGroup> &groups) {
+      draw_annotations(frame, groups);
+    };
+  } else if (scene.annotations) {
+    warn("without Cairo, the picture that shows without JavaScript has no annotations");
   }
   if (options.site.empty()) {
     options.page.field = load_field(scene, options.compression);

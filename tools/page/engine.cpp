@@ -43,6 +43,7 @@
 #include "core/base/error.hpp"
 #include "core/host/host_renderer.hpp"
 #include "core/io/input_file.hpp"
+#include "core/view/trigonometry.hpp"
 #include "core/zfp/chunk_file.hpp"
 #include "core/zfp/voxel_region.hpp"
 #include "core/zfp/zfp_file.hpp"
@@ -388,7 +389,7 @@ json probe(const json &request) {
   const glm::dvec3 eye = vector(camera.eye), forward = glm::normalize(vector(camera.at) - eye),
                    right = glm::normalize(glm::cross(forward, vector(camera.up)));
   const double half = camera.parallel_height ? *camera.parallel_height / 2
-                                             : std::tan(glm::radians(camera.fovy_degrees) / 2),
+                                             : core::tangent(glm::radians(camera.fovy_degrees) / 2),
                u = (2 * pixel(request.at("at").at(0), size.width) / size.width - 1) * half *
                    size.width / size.height,
                v = (1 - 2 * pixel(request.at("at").at(1), size.height) / size.height) * half;

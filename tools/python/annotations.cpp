@@ -29,14 +29,21 @@ nb::dict dict_of(const isowave::AnnotationGroup &group) {
   return result;
 }
 
+}  // namespace
+
+nb::list list_of(const std::vector<isowave::AnnotationGroup> &groups) {
+  nb::list result;
+  for (const isowave::AnnotationGroup &group : groups) result.append(dict_of(group));
+  return result;
+}
+
+namespace {
+
 nb::list annotation_layout(const nb::dict &wanted, const nb::dict &request,
                            const std::optional<std::array<double, 2>> &color_range,
                            const std::optional<std::array<double, 2>> &slice_range) {
-  nb::list result;
-  for (const isowave::AnnotationGroup &group : isowave::annotation_layout(
-           annotations_of(wanted), request_of(request), color_range, slice_range))
-    result.append(dict_of(group));
-  return result;
+  return list_of(isowave::annotation_layout(annotations_of(wanted), request_of(request),
+                                            color_range, slice_range));
 }
 
 }  // namespace

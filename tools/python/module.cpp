@@ -54,6 +54,7 @@ NB_MODULE(_core, m) {
   add_volumes(m);
   add_renderers(m);
   add_annotations(m);
+  add_pages(m);
 }
 
 }  // namespace isowave_python

@@ -299,5 +299,6 @@ isowave::Compression compression_of(const nb::dict &options);
 void add_volumes(nb::module_ &m);
 void add_renderers(nb::module_ &m);
 void add_annotations(nb::module_ &m);
+void add_pages(nb::module_ &m);
 
 }  // namespace isowave_python

@@ -459,27 +459,6 @@ void add_renderers(nb::module_ &m) {
         isowave::write_scene(scene_of(scene), path);
       },
       "scene"_a, "path"_a);
-  m.def(
-      "save_page",
-      [](const PyVolume &volume, const nb::dict &fields, const std::filesystem::path &path,
-         const std::filesystem::path &engine, const std::string &title, const PyVolume *field) {
-        const isowave::Scene scene = scene_of(fields);
-        const WithoutGil no_gil;
-        isowave::save_page(volume.volume, scene, path,
-                           {.engine = engine,
-                            .title = title,
-                            .field = field == nullptr ? nullptr : field->volume});
-      },
-      "volume"_a, "scene"_a, "path"_a, "engine"_a, "title"_a, "field"_a.none());
-  m.def(
-      "save_site",
-      [](const PyVolume &volume, const nb::dict &fields, const std::filesystem::path &folder,
-         const std::filesystem::path &engine, const std::string &title) {
-        const isowave::Scene scene = scene_of(fields);
-        const WithoutGil no_gil;
-        isowave::save_site(volume.volume, scene, folder, {.engine = engine, .title = title});
-      },
-      "volume"_a, "scene"_a, "folder"_a, "engine"_a, "title"_a);
   nb::class_<PassView>(m, "PassView")
       .def_prop_ro("passes", &PassView::passes)
       .def_prop_ro("completed_percent", &PassView::completed_percent)

@@ -14,6 +14,9 @@ isowave::Annotations annotations_of(const nb::dict &fields);
 isowave::Scene scene_of(const nb::dict &fields);
 isowave::RendererOptions renderer_options_of(const nb::dict &options);
 
+/// Dicts of groups.
+nb::list list_of(const std::vector<isowave::AnnotationGroup> &groups);
+
 /// All fields.
 nb::dict dict_of(const isowave::Scene &scene);
 

@@ -4,9 +4,12 @@
 
 #include <array>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
+#include "isowave/annotations.hpp"
 #include "isowave/camera.hpp"
 #include "isowave/scene.hpp"
 #include "isowave/volume.hpp"
@@ -23,6 +26,9 @@ struct PageOptions {
   std::shared_ptr<const Volume> field{};
   /// Size of the picture that is seen until the engine has drawn one, and without JavaScript.
   ImageSize poster{1280, 720};
+  /// Draws annotations over that picture, in place; the library itself draws no letters. Called if
+  /// the scene has annotations and the picture has room for them. Empty: the picture has none.
+  std::function<void(Frame &frame, const std::vector<AnnotationGroup> &groups)> annotate{};
 };
 
 /// Writes a page: one HTML file that holds the engine, the volume, the scene and a picture. It
@@ -30,7 +36,7 @@ struct PageOptions {
 /// can turn the scene and change it. Each compressed volume takes 4/3 of its bytes.
 ///
 /// scene   its volumes are not opened. Without a camera, the surfaces fill the picture. The page
-///         draws the annotations, and the picture has none
+///         draws the annotations; PageOptions::annotate draws those of the picture
 /// path    ends in .html; the file appears when it is complete
 /// Throws  Error: no engine; a scene with what pages do not show: tables of colours, surfaces that
 ///         are not clipped or mapped, more than eight clipping planes; colours by a second volume

@@ -17,7 +17,8 @@ namespace {
 
 constexpr std::uintptr_t kPageBytes = 1u << 16;  ///< Windows reserves addresses by as many
 
-/// A std::shared_mutex by Windows. With that of winpthreads, more programs under Wine never ended.
+/// A std::shared_mutex by Windows. That of winpthreads takes memory when it is first locked, which
+/// a handler of exceptions should not.
 class SharedMutex {
  public:
   void lock() { ::AcquireSRWLockExclusive(&lock_); }

@@ -14,14 +14,16 @@ import numpy as np
 from isowave._annotate import draw
 from isowave._core import Error
 
-OPTIONS = ("--annotate", "--scene")
-"""Those of `render` without which nothing is annotated."""
+OPTIONS = {"render": {"--annotate", "--scene"}, "export": {"--scene"}}
+"""Those of commands without which nothing is annotated, unless a scene is exported."""
 VARIABLE = "ISOWAVE_ANNOTATOR"
 
 
 def may_annotate(arguments: Sequence[str]) -> bool:
+    command = arguments[0] if arguments else ""
     names = {text.partition("=")[0] for text in arguments}
-    return arguments[:1] == ["render"] and not names.isdisjoint(OPTIONS)
+    is_scene = command == "export" and any(text.endswith(".json") for text in arguments)
+    return is_scene or not names.isdisjoint(OPTIONS.get(command, ()))
 
 
 def start(command: Sequence[Any], reads_output: bool = False) -> subprocess.Popen[bytes]:

@@ -38,6 +38,7 @@ def save_page(
     engine: str | PathLike[str],
     title: str,
     field: Volume | None,
+    annotate: Callable[[NDArray[np.uint8], list[dict[str, Any]]], NDArray[np.uint8]],
 ) -> None: ...
 def save_site(
     volume: Volume,
@@ -45,6 +46,7 @@ def save_site(
     folder: str | PathLike[str],
     engine: str | PathLike[str],
     title: str,
+    annotate: Callable[[NDArray[np.uint8], list[dict[str, Any]]], NDArray[np.uint8]],
 ) -> None: ...
 def annotation_layout(
     wanted: dict[str, Any],

@@ -6,6 +6,7 @@ import os
 from typing import Any
 
 from isowave import _core, _loader
+from isowave._annotate import draw
 
 ENGINE = _loader.PACKAGE / "page.html.gz"  # of a wheel that has one
 
@@ -21,14 +22,14 @@ def save_page(
     """
     is_used = fields.get("color_by_field") and fields.get("field") != "volume"
     second = _core_of(field) if is_used and field is not None else None
-    _core.save_page(_core_of(volume), fields, os.fsdecode(path), _engine(), title, second)
+    _core.save_page(_core_of(volume), fields, os.fsdecode(path), _engine(), title, second, draw)
 
 
 def save_site(
     volume: Any, fields: dict[str, Any], folder: str | os.PathLike[str], title: str
 ) -> None:
     """Writes a page and, beside it, its volume. Arguments and errors as save_page()."""
-    _core.save_site(_core_of(volume), fields, os.fsdecode(folder), _engine(), title)
+    _core.save_site(_core_of(volume), fields, os.fsdecode(folder), _engine(), title, draw)
 
 
 def _core_of(volume: Any) -> _core.Volume:

@@ -179,7 +179,8 @@ class Scene:
         """Writes a page: one HTML file that shows the scene in any browser, without a server.
 
         The page holds the compressed volume and all that draws it, with the same bits. People can
-        turn the scene and change it. Without JavaScript, it shows a picture.
+        turn the scene and change it. Without JavaScript, it shows a picture with the scene's
+        annotations.
 
         Parameters
         ----------

@@ -327,6 +327,47 @@ def test_the_poster_shows_without_javascript(
     keep(page, "page_without_javascript")
 
 
+def poster_of(path: Path) -> Any:
+    """Pixels of a page's picture."""
+    data = re.search(r'<img[^>]*src="data:image/png;base64,([^"]*)"', path.read_text())
+    assert data
+    return np.asarray(Image.open(io.BytesIO(base64.b64decode(data[1]))))
+
+
+def test_the_poster_has_the_annotations(volume: isowave.Volume, tmp_path: Path) -> None:
+    look = {"color_map": "viridis"}
+    scene = volume.scene().surface(10).look(**look).annotate(units="mm", title="A title")
+    camera = volume.camera(10, size=(1280, 720))
+    image = volume.render(10, camera=camera, device="host", **look)
+    expected = image.annotated(units="mm", title="A title")
+    assert not np.array_equal(expected, image.rgb)
+    scene.save_html(tmp_path / "a.html")
+    assert np.array_equal(poster_of(tmp_path / "a.html"), expected)
+    scene.save_site(tmp_path / "site")
+    assert np.array_equal(poster_of(tmp_path / "site/index.html"), expected)
+    # As the viewer's button does it.
+    scene.save(tmp_path / "s.json")
+    fields = _core.parse_scene((tmp_path / "s.json").read_text())
+    volume.save_page(fields, tmp_path / "v.html", "A view", None)
+    assert np.array_equal(poster_of(tmp_path / "v.html"), expected)
+    # Without a title, that of the page.
+    scene.annotate("caption").save_html(tmp_path / "b.html", title="Fuel, burning")
+    expected = image.annotated("caption", title="Fuel, burning")
+    assert np.array_equal(poster_of(tmp_path / "b.html"), expected)
+
+
+def test_what_annotating_raises_is_raised(
+    volume: isowave.Volume, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise ValueError("no letters")
+
+    monkeypatch.setattr("isowave._page.draw", fail)
+    with pytest.raises(ValueError, match="no letters"):
+        volume.scene().surface(10).annotate().save_html(tmp_path / "a.html")
+    assert not list(tmp_path.iterdir())
+
+
 def test_without_webassembly_one_line_says_so(open_page: Callable[..., Any], html: Path) -> None:
     page = open_page()
     page.add_init_script("delete globalThis.WebAssembly")

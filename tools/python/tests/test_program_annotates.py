@@ -1,5 +1,8 @@
 """`isowave render --annotate` of the wheel, whose program has no Cairo: Pillow draws."""
 
+import base64
+import io
+import re
 import shutil
 import subprocess
 import sys
@@ -12,6 +15,7 @@ from PIL import Image
 from test_files_program import command
 
 import isowave
+from isowave._page import ENGINE
 from isowave._program import PROGRAM
 
 SIZE = (320, 240)
@@ -37,6 +41,21 @@ def pixels(path):
 def expect_refused(says, *options, program=command):
     done = program(*RENDER, *options)
     assert done.returncode == 1 and says in done.stderr and done.stderr.count("\n") == 1, done
+
+
+@pytest.mark.skipif(not ENGINE.is_file(), reason="the package has no engine for pages")
+def test_pages_of_the_program_have_annotations(tmp_path, fuel):
+    scene = fuel.scene().surface(40).annotate(units="mm")
+    scene.save(tmp_path / "s.json")
+    done = command(
+        "export", FUEL, "--exact", "--scene", tmp_path / "s.json", "-o", "p.html", cwd=tmp_path
+    )
+    assert (done.returncode, done.stderr) == (0, ""), done.stderr
+    image = scene.render(camera=fuel.camera(40, size=(1280, 720)), device="host")
+    html = (tmp_path / "p.html").read_text()
+    data = re.search(r"data:image/png;base64,([^\"]*)", html)[1]
+    expected = image.annotated(units="mm", title=TITLE)
+    assert np.array_equal(pixels(io.BytesIO(base64.b64decode(data))), expected)
 
 
 @pytest.mark.parametrize(
