@@ -38,6 +38,7 @@ struct Options {
   float isovalue = 128;
   tools::CompressionOptions compression{.rate = 4};
   std::uint32_t orbit = 10, rounds = 3;
+  double turn = 1;
   std::vector<std::uint32_t> size = {1280, 720};
   tools::RendererFlags renderer;
   std::string brick;     ///< R/N: brick R of N alone; empty: as mpirun has it
@@ -107,7 +108,7 @@ std::map<std::string, Frames> measure_frames(TeamRenderer &renderer, Team &team,
   const std::vector<Camera> cameras = orbit_cameras(whole, options.orbit);
   const auto request_of = [&](std::uint32_t view, bool is_next) {
     FrameRequest request;
-    request.camera = is_next ? turned(cameras[view]) : cameras[view];
+    request.camera = is_next ? core::turned(cameras[view], options.turn) : cameras[view];
     request.isovalue = options.isovalue;
     return request;
   };
@@ -215,6 +216,8 @@ void add_options(CLI::App &app, Options &options) {
       ->capture_default_str();
   app.add_option("--rounds", options.rounds, "times that every view is drawn")
       ->check(CLI::Range(1u, 100000u))
+      ->capture_default_str();
+  app.add_option("--turn", options.turn, "angle from a view to its next frame [degrees]")
       ->capture_default_str();
   app.add_option("--device", options.device, "of the first process of a host: see isowave render");
   tools::add_renderer_options(app, options.renderer);
