@@ -75,6 +75,7 @@ struct Frames {
   std::vector<double> own;          ///< until this one is
   std::vector<double> composition;  ///< of the picture, with the wait for others
   std::vector<double> picture;      ///< until the picture is in rank 0's memory
+  std::vector<double> given;        ///< bytes for it that this process gave to others
   std::vector<double> passes, decoded, recycled, free;  ///< free: slots after the last pass
   std::map<std::string, std::vector<double>> stages;    ///< ms of each stage, if they are timed
 };
@@ -98,9 +99,11 @@ void draw(TeamRenderer &renderer, Team &team, const FrameRequest &request, Frame
   frames.free.push_back(stats.passes.back().counts.free_count);
   for (const auto &[stage, ms] : stages) frames.stages[stage].push_back(ms);
   const double before = renderer.composition().ms;
+  const std::uint64_t given_before = team.given_bytes();
   renderer.shade({});
   frames.picture.push_back(ms_since(begin));
   frames.composition.push_back(renderer.composition().ms - before);
+  frames.given.push_back(static_cast<double>(team.given_bytes() - given_before));
 }
 
 std::map<std::string, Frames> measure_frames(TeamRenderer &renderer, Team &team,
@@ -132,6 +135,7 @@ void report(const Options &options, const std::string &command, ocl::Device &dev
   ordered_json own = of_rank;
   for (const auto &[kind, frames] : kinds) {
     own["frames"][kind] = {{"own_ms", spread_json(spread_of(frames.own))},
+                           {"given_bytes", median(frames.given)},
                            {"passes", median(frames.passes)},
                            {"decoded_blocks", median(frames.decoded)},
                            {"recycled_blocks", median(frames.recycled)},
