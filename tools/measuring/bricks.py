@@ -61,8 +61,8 @@ def measure(run, field, dims, size, brick=None, ranks=None, **storage):
 
 
 def cases_of(run, section, cases):
-    """The rows of all cases (devices, field, dims, size, storage); those for which there are too few
-    devices are left out, with a line."""
+    """The rows of all cases (devices, field, dims, size, storage). Cases with more devices than
+    there are get a line in place of a row."""
     there = num_devices(run)
     lacking = sorted({case[0] for case in cases if case[0] > there})
     if lacking:
@@ -143,7 +143,7 @@ def series_of(rows):
 
 
 def efficiency(row, first, kind, strong):
-    """Of a frame with its picture on the host, beside the case of the fewest devices."""
+    """Efficiency of a frame with its picture on the host, beside the case of the fewest devices."""
     before, now = (case["frames"][kind]["picture_ms"]["median"] for case in (first, row))
     more = len(row["ranks"]) / len(first["ranks"]) if strong else 1
     return before / (more * now)
@@ -221,7 +221,7 @@ def large_bricks(rows):
 
 
 def bricks_by_themselves(rows):
-    """Of each number of bricks, the slowest by its median, kind by kind."""
+    """Each number of bricks has the times of its slowest, by median, kind by kind."""
     yield (
         "volume",
         "bricks",
