@@ -124,7 +124,8 @@ TEST_P(NoiseFieldOnDevice, BricksAreCompressedWhereTheyAreMade) {
     SCOPED_TRACE(type);
     const std::string name = "generate:scan_45x38x41_" + type;
     const VolumeInfo whole = read_levels(name, {}).front();
-    Storage by_host{.rate = 4}, in_place{.rate = 4, .encoder = encoder_on(device_)};
+    Storage by_host{.rate = 4, .measure_error = true}, in_place = by_host;
+    in_place.encoder = encoder_on(device_);
     in_place.noise = [&](const NoiseField &field, const glm::uvec3 &, VoxelType of_type) {
       return std::make_unique<InPlaceAlone>(device_, field, of_type);
     };
@@ -134,6 +135,7 @@ TEST_P(NoiseFieldOnDevice, BricksAreCompressedWhereTheyAreMade) {
                              made = load_brick(name, {}, in_place, whole, 1, own);
       EXPECT_TRUE(made.words == expected.words);
       EXPECT_EQ(made.value_range, expected.value_range);
+      EXPECT_EQ(made.max_voxel_error, expected.max_voxel_error);
       EXPECT_GT(made.value_range[1], made.value_range[0]) << "else nothing is tested";
     }
     in_place.levels = 2;

@@ -211,7 +211,7 @@ class DeviceCoder : public LevelCoder {
 
   std::optional<std::array<float, 2>> code_made(DeviceVoxels &voxels) override {
     auto *in_place = dynamic_cast<VoxelsInPlace *>(&voxels);
-    if (in_place == nullptr || measure_error_) return {};
+    if (in_place == nullptr) return {};
     encoder_.encode(*in_place, sink_, progress_);
     return in_place->range();
   }
