@@ -1,6 +1,6 @@
-#include "tools/isowave/host_words.hpp"
-
 #ifdef ISOWAVE_HAS_MPI
+
+#include "tools/isowave/host_words.hpp"
 
 #include <algorithm>
 #include <array>

@@ -10,7 +10,9 @@
 
 #include <mpi.h>
 
+#include <algorithm>
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <span>
