@@ -65,6 +65,11 @@ class AloneOf : public TeamOfOne {
   std::vector<std::string> all_gather(const std::string &text) override {
     return std::vector<std::string>(size_, text);
   }
+  void reduce(std::size_t count, Reduction, Receiver who, const MakeWords &make,
+              const TakeWords &take) override {
+    reduce_in_pieces(count, who == Receiver::kAll || rank_ == 0, make, take,
+                     [](std::span<std::uint64_t>) {});
+  }
 
  private:
   std::uint32_t rank_ = 0, size_ = 1;
