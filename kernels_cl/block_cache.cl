@@ -229,9 +229,11 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_se
     put_first(frame, first_missing, places, num_first_missing, requested_bits, request_block_ids);
     granted = min(requested, max(num_slots - in_use, num_first_missing));
     evicted = granted > num_free ? granted - num_free : 0;
-    if (evicted !=
-        0) { /* some more that are out of use, so that the next passes need not count again */
-      const uint unused = histogram[ISO_EVICTION_RANKS - 1];
+    if (evicted != 0) { /* some more that neither this frame nor the last has used, so that the next
+                           passes need not count again */
+      uint unused = 0;
+      for (rank = ISO_RANKS_OF_EARLIER; rank < ISO_EVICTION_RANKS; ++rank)
+        unused += histogram[rank];
       evicted += min(num_slots / ISO_SPARE_PART, unused - min(unused, evicted));
     }
     for (rank = ISO_EVICTION_RANKS - 1; rank > 0 && before + histogram[rank] < evicted; --rank) {

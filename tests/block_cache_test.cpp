@@ -100,8 +100,8 @@ class CacheModel {
         ASSERT_FALSE(first_grid.contains(slots_[slot])) << "a block of the first pair was evicted";
         if (slots_[slot] != ISO_INVALID_ID) last_evicted = std::max(last_evicted, order(slot));
       } else if (slots[slot] == ISO_INVALID_ID && slots_[slot] != ISO_INVALID_ID) {
-        ASSERT_EQ(order(slot), Order(kEarlier, -static_cast<int>(kOldest)))
-            << "freed without need, though still of use";
+        ASSERT_EQ(order(slot).first, kEarlier) << "freed without need, though still of use";
+        last_evicted = std::max(last_evicted, order(slot));
         slots_[slot] = ISO_INVALID_ID;
         ++spared;
       } else {

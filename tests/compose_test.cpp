@@ -29,6 +29,26 @@ TEST(Compose, TheSmallestWordsAndHalves) {
             (std::vector<std::uint64_t>{0x0000000700000009, 0xFFFFFFFFFFFFFFFF, 15}));
 }
 
+/// Processes leave out words that give nothing: one that gives something among them is enough.
+TEST(Compose, WordsThatMayChangeTheOutcome) {
+  struct Case {
+    Reduction how;
+    std::uint64_t nothing, something;
+  };
+  for (const Case &each : {Case{Reduction::kMin, 0xFFFFFFFF7F800000, 0xFFFFFFFE7F800000},
+                           Case{Reduction::kMinOfHalves, 0xFF123456FF654321, 0xFF123456FE654321},
+                           Case{Reduction::kMinOfHalves, 0xFFFFFFFFFFFFFFFF, 0x00FFFFFFFFFFFFFF},
+                           Case{Reduction::kOr, 0, 0x8000000000000000}}) {
+    std::vector<std::uint64_t> words(9, each.nothing);
+    EXPECT_FALSE(may_change(words, each.how)) << each.nothing;
+    for (const std::size_t at : {0u, 4u, 8u}) {
+      words[at] = each.something;
+      EXPECT_TRUE(may_change(words, each.how)) << each.something << " at " << at;
+      words[at] = each.nothing;
+    }
+  }
+}
+
 /// A brick's picture as DeviceRenderer::shade_packed() has it.
 std::vector<std::uint32_t> random_colors(std::size_t num_rays, std::mt19937 &rng) {
   constexpr std::uint32_t kBackground = 0x123456;

@@ -44,6 +44,7 @@ tables=(frames normals error time cpus stability leaks storage sizes detail solv
   paper_claims paper_stand_ins paper_passes paper_times
   paper_published_passes paper_published_memory paper_progress paper_utilisation paper_scanned
   paper_limits paper_working_set paper_memory paper_blocks paper_scaling by_device)
+brick_charts=()
 if [ -x "$programs/bench/peer_bench" ]; then
   measured --only peer
   tables+=(peer)
@@ -54,8 +55,9 @@ if [ -x "$programs/bench/gpu_peer" ]; then
 fi
 if [ -x "$programs/bench/brick_bench" ]; then
   export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
-  measured --only bricks
-  tables+=(in_bricks)
+  measured --only bricks,bricks_alone
+  tables+=(weak_scaling strong_scaling exact_scaling large_bricks bricks_by_themselves)
+  brick_charts=(a_weak a_strong)
 fi
 for table in "${tables[@]}"; do
   printf '<!-- table: %s results/a.json -->\n<!-- end -->\n' "$table"
@@ -76,7 +78,7 @@ EOF
 if grep -qF "$top/tests/data" "$results"; then fail 'the folder of the volumes is named'; fi
 "$top/tools/charts" "$results" -o "$work" > "$work/out"
 for chart in a_{cells,frames,pareto,pareto_{new,wrong,bytes},stability,topology,budgets} \
-  a_{time,memory,speculation}; do
+  a_{time,memory,speculation} "${brick_charts[@]}"; do
   [ -s "$work/$chart.png" ] || fail "$chart.png is missing"
 done
 
@@ -91,6 +93,30 @@ from measuring.paper import ARTICLE, STAND_INS, in_collection, rate_of
 assert set(STAND_INS.values()) == {"", *ARTICLE}, "each set of the article has a stand-in"
 assert in_collection("richtmyer") == "Richtmyer-Meshkov" and in_collection("bonsai") is None
 assert [rate_of(name) for name in ("Richtmyer-Meshkov", "Skull", "", None)] == [1, 4, 4, 4]
+EOF
+PYTHONPATH=$top/tools /usr/bin/python3 -B - << 'EOF'
+import json, types
+from measuring import bricks
+def a_run(device, there):
+    names = {"device": "GPU 1", "platform": "P"}
+    listed = [{"name": "GPU 1", "platform": "P"}] * there + [{"name": "GPU 2", "platform": "P"}]
+    options = types.SimpleNamespace(quick=False, on_cpu=False, device=device)
+    say = lambda *_, **__: json.dumps(listed)
+    return types.SimpleNamespace(options=options, machine=names, run=say)
+assert [bricks.num_devices(a_run("GPU", n)) for n in (1, 4)] == [1, 4]
+assert bricks.num_devices(a_run("0,1", 4)) == 2
+def row(devices, cold, name="mixing_layer_8x8x8"):
+    frames = {kind: {"picture_ms": {"median": cold}} for kind in bricks.KINDS}
+    return {"volume": name, "storage": "rate 4", "size": [8, 8], "frames": frames,
+            "ranks": [{}] * devices}
+rows = [row(4, 4.0), row(1, 3.0), row(2, 2.0, "shell_8x8x8")]
+(found,) = [found for key, found in bricks.series_of(rows).items() if key[0] == "mixing_layer"]
+assert [len(one["ranks"]) for one in found] == [1, 4]
+assert bricks.efficiency(found[1], found[0], "cold", False) == 0.75
+assert bricks.efficiency(found[1], found[0], "cold", True) == 0.1875
+bricks.measure = lambda run, field, dims, size, ranks, **storage: (field, dims, ranks)
+assert bricks.bricks_large(a_run("GPU", 4)) == [("mixing_layer", "4096x4096x8192", 4)]
+assert len(bricks.bricks_weak(a_run("GPU", 8))) == 12
 EOF
 PYTHONPATH=$top/tools /usr/bin/python3 -B - << 'EOF'
 from measuring.gpu_peers import SIDES, gpu_peers

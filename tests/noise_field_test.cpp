@@ -1,7 +1,6 @@
 // noise_field.cl against the host's rows of the same fields.
 
 #include "core/sources/noise_field.hpp"
-#include "core/sources/noise_on_device.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +8,9 @@
 #include <utility>
 #include <vector>
 
+#include "core/bricks/brick_volume.hpp"
 #include "core/io/raw_reader.hpp"
+#include "core/sources/noise_on_device.hpp"
 #include "tests/test_devices.hpp"
 
 namespace isowave::core {
@@ -101,6 +102,48 @@ TEST_P(NoiseFieldOnDevice, ReadersGiveTheSameVoxels) {
   options.noise = noise_on(GetParam());
   open_generated(options)->read_layers(0, 21, by_device);
   EXPECT_EQ(by_host, by_device);
+}
+
+/// Noise that the encoder's device makes, also on CPUs; nothing can be read.
+class InPlaceAlone : public NoiseVoxels {
+ public:
+  InPlaceAlone(ocl::Device &device, const NoiseField &field, VoxelType type)
+      : in_place_(device, field, type) {}
+  void evaluate(std::uint32_t, std::uint32_t, std::span<std::byte>) override {
+    throw std::logic_error("read");
+  }
+  DeviceVoxels *in_place() override { return &in_place_; }
+
+ private:
+  NoiseInPlace in_place_;
+};
+
+/// Nothing of the voxels comes to the host, and bricks have the words that the host's voxels have.
+TEST_P(NoiseFieldOnDevice, BricksAreCompressedWhereTheyAreMade) {
+  for (const std::string type : {"uint8", "int16"}) {
+    SCOPED_TRACE(type);
+    const std::string name = "generate:scan_45x38x41_" + type;
+    const VolumeInfo whole = read_levels(name, {}).front();
+    Storage by_host{.rate = 4, .measure_error = true}, in_place = by_host;
+    in_place.encoder = encoder_on(device_);
+    in_place.noise = [&](const NoiseField &field, const glm::uvec3 &, VoxelType of_type) {
+      return std::make_unique<InPlaceAlone>(device_, field, of_type);
+    };
+    for (const BlockBox &own :
+         {BlockBox{{0, 0, 0}, {12, 10, 11}}, BlockBox{{3, 2, 4}, {7, 9, 11}}}) {
+      const CompressedVolume expected = load_brick(name, {}, by_host, whole, 1, own),
+                             made = load_brick(name, {}, in_place, whole, 1, own);
+      EXPECT_TRUE(made.words == expected.words);
+      EXPECT_EQ(made.value_range, expected.value_range);
+      EXPECT_EQ(made.max_voxel_error, expected.max_voxel_error);
+      EXPECT_GT(made.value_range[1], made.value_range[0]) << "else nothing is tested";
+    }
+    in_place.levels = 2;
+    EXPECT_THROW(
+        compress_volume([&] { return open_any_volume(name, {}, in_place.noise); }, name, in_place),
+        std::logic_error)
+        << "levels of detail need the voxels";
+  }
 }
 
 TEST(NoiseField, CpusAndDevicesWithoutDoublesAreLeftOut) {

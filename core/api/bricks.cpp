@@ -88,7 +88,7 @@ core::Storage storage_on(core::ocl::Device &device, const std::string &path,
                          const Compression &compression) {
   core::Storage storage = storage_for(path, compression);
   storage.encoder = core::encoder_on(device);
-  storage.noise = core::noise_on(device.info());
+  storage.noise = core::noise_on(device);
   return storage;
 }
 

@@ -33,6 +33,17 @@ void reduce_into(std::span<std::uint64_t> words, std::span<const std::uint64_t> 
   }
 }
 
+bool may_change(std::span<const std::uint64_t> words, Reduction how) {
+  std::uint64_t all = ~std::uint64_t{0}, any = 0;
+  for (const std::uint64_t word : words) {
+    all &= word;
+    any |= word;
+  }
+  if (how == Reduction::kOr) return any != 0;
+  const std::uint64_t nothing = how == Reduction::kMin ? 0xFFFFFFFF00000000u : 0xFF000000FF000000u;
+  return (all & nothing) != nothing;
+}
+
 WordsInPlace in_place(std::span<std::uint64_t> words) {
   return {[words](std::size_t begin, std::span<std::uint64_t> part) {
             std::ranges::copy(words.subspan(begin, part.size()), part.begin());

@@ -20,16 +20,22 @@ struct Message {
 using Outgoing = Message<const std::byte>;
 using Incoming = Message<std::byte>;
 
+/// Words of one place that give nothing are the same at all processes. So processes need not send
+/// them.
 enum class Reduction {
-  kMin,          ///< the smallest word
-  kMinOfHalves,  ///< of the upper 32 bits and of the lower ones, each by itself
-  kOr            ///< the bits of all
+  kMin,          ///< the smallest word; a word gives nothing if its upper 32 bits are ones
+  kMinOfHalves,  ///< the smallest upper 32 bits, and the smallest lower ones; 32 bits give nothing
+                 ///< if the upper 8 of them are ones
+  kOr            ///< the bits of all; 0 gives nothing
 };
 enum class Receiver { kRank0, kAll };
 
 /// Makes words of `words`, each with that of others at its place.
 void reduce_into(std::span<std::uint64_t> words, std::span<const std::uint64_t> others,
                  Reduction how);
+
+/// Whether words may change the outcome of a reduction: if they cannot, all give nothing.
+bool may_change(std::span<const std::uint64_t> words, Reduction how);
 
 /// One process's part in a reduction: it gives its words from `begin` on. Called for parts, in any
 /// order, and from several threads.
@@ -56,6 +62,9 @@ class Team {
   /// outcome call `take`.
   virtual void reduce(std::size_t count, Reduction how, Receiver who, const MakeWords &make,
                       const TakeWords &take) = 0;
+  /// Bytes of words that this process has given to others in reductions, so far; 0 if that is not
+  /// counted.
+  virtual std::uint64_t given_bytes() const { return 0; }
   /// Sends and receives, in order, and returns when both are done; never from or to this process.
   /// Only the named processes call it. Drawing does not need it.
   virtual void exchange(std::span<const Outgoing> sent, std::span<const Incoming> received);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -21,6 +22,20 @@ namespace isowave::core {
 
 namespace {
 
+/// A box of voxels that a device makes.
+class VoxelsOfBox : public VoxelsInPlace {
+ public:
+  VoxelsOfBox(VoxelsInPlace &whole, const glm::uvec3 &first) : whole_(whole), first_(first) {}
+  void make(const glm::uvec3 &begin, const glm::uvec3 &dims, ocl::Buffer<float> &voxels) override {
+    whole_.make(first_ + begin, dims, voxels);
+  }
+  std::array<float, 2> range() override { return whole_.range(); }
+
+ private:
+  VoxelsInPlace &whole_;
+  glm::uvec3 first_;
+};
+
 /// A box of a volume's voxels.
 class CroppedReader : public VolumeReader {
  public:
@@ -37,6 +52,11 @@ class CroppedReader : public VolumeReader {
     crop(z_begin, num_layers, out, doubles_, [this](std::uint32_t z, std::span<double> layer) {
       whole_->read_exact_layers(z, 1, layer);
     });
+  }
+
+  DeviceVoxels *on_device() override {
+    auto *whole = dynamic_cast<VoxelsInPlace *>(whole_->on_device());
+    return whole != nullptr ? &made_.emplace(*whole, info_.brick.first_voxel) : nullptr;
   }
 
  private:
@@ -58,6 +78,7 @@ class CroppedReader : public VolumeReader {
   }
 
   std::unique_ptr<VolumeReader> whole_;
+  std::optional<VoxelsOfBox> made_{};
   std::vector<float> floats_;
   std::vector<double> doubles_;
 };

@@ -17,6 +17,8 @@ namespace {
 /// Caches with fewer slots may run out of slots within one pass, unless they are made for the
 /// blocks that a frame needs (MemoryPlan::can_grow()), or for all blocks.
 constexpr std::uint32_t kSmallCache = 1u << 16;
+/// A frame that decodes less than one block for so many slots counts as a repeated one.
+constexpr std::uint32_t kFewBlocksPart = 32;
 /// Slots are scarce if fewer than one of so many are free: half of what is freed at a time
 /// (ISO_SPARE_PART), so that most passes free none.
 constexpr std::uint32_t kScarcePart = 16;
@@ -108,6 +110,7 @@ BlockStore::BlockStore(ocl::Device &of, const CompressedVolume &volume,
                .cache_slots = cache.num_slots,
                .scanned_pairs = 0};
   wanted_slots_ = plan.cache_slots;
+  note_empty();
   is_small_ = plan.cache_slots < kSmallCache && !plan.can_grow() &&
               plan.cache_slots < plan.limits.cache.num_blocks;
   level_frames->reserve(levels.size());  // they never move while they are written
@@ -247,12 +250,30 @@ void BlockStore::note(const PassCounts &counts) {
   slots_are_scarce_ =
       is_small_ ||
       counts.free_count < std::max<std::uint64_t>(cache.num_slots / kScarcePart, spoken_for);
+  const std::uint64_t slots_given = std::uint64_t{counts.free_count} + counts.decoded_count;
+  filling_.decoded += counts.decoded_count;
+  filling_.evicted += slots_given - std::min<std::uint64_t>(slots_given, filling_.free_slots);
+  filling_.free_slots = counts.free_count;
+}
+
+void BlockStore::note_empty() {
+  filling_ = {.free_slots = cache.num_slots};
+}
+
+/// Blocks that the frame which ends has freed, if it is the second that fills the cache: they are
+/// those of the frame before, of which the next frame would see many again. 0 else.
+std::uint64_t BlockStore::lacked_by_second_frame() {
+  const auto [decoded, evicted] =
+      std::pair(std::exchange(filling_.decoded, 0), std::exchange(filling_.evicted, 0));
+  if (decoded <= cache.num_slots / kFewBlocksPart) return 0;
+  return ++filling_.num_frames == 2 ? evicted : 0;
 }
 
 void BlockStore::close(std::uint64_t recycled, bool goes_on) {
   if (!goes_on && recycled > most_recycled(cache.num_slots, device.info().type, plan.stream))
     clear();
-  wanted_slots_ = std::max(wanted_slots_, grown_cache_slots(plan, recycled));
+  const std::uint64_t lacked = goes_on ? 0 : lacked_by_second_frame();
+  wanted_slots_ = std::max(wanted_slots_, grown_cache_slots(plan, std::max(recycled, lacked)));
 }
 
 /// Makes an empty cache of wanted_slots_, between frames. The old cache is freed first, so that the
@@ -281,6 +302,7 @@ void BlockStore::grow(Wavefront &rays) {
 
 void BlockStore::clear() {
   cache.clear();
+  note_empty();
   cached_surface_.reset();
 }
 
@@ -288,6 +310,7 @@ void BlockStore::resize(const BlockCache::Limits &limits, Wavefront &rays) {
   cache.resize(limits);
   for (Level &level : levels) level.decode.resize(limits.max_requests());
   if (on_resize) on_resize(limits.num_slots);
+  note_empty();
   rays.reset_counts();
   slots_are_scarce_ = true;
   cached_surface_.reset();

@@ -127,7 +127,8 @@ class BlockStore {
   /// Closes a frame, or a part of one.
   ///
   /// recycled     slots that the frame has freed of blocks that it had requested itself: if they
-  ///              are many, the cache grows at the next open()
+  ///              are many, the cache grows at the next open(); it also grows if two frames after
+  ///              each other have no room, since freeing takes a GPU long
   /// goes_on      whether the next frame goes on with these blocks. If not, and the blocks that are
   ///              left would slow the next frame down, the cache is emptied.
   /// Waits        no
@@ -163,6 +164,17 @@ class BlockStore {
   void classify(Wavefront &rays, const Surface &surface);
   void decode_as(const std::vector<DecodedValues> &values);
 
+  /// How the cache filled since it was empty.
+  struct Filling {
+    std::uint32_t free_slots = 0;  ///< after the last pass that was noted
+    std::uint64_t evicted = 0;     ///< blocks freed by the frame at work ...
+    std::uint64_t decoded = 0;     ///< ... and decoded by it
+    std::uint32_t num_frames = 0;  ///< frames that decoded more than a few blocks
+  };
+  std::uint64_t lacked_by_second_frame();
+  void note_empty();
+
+  Filling filling_{};
   std::uint32_t wanted_slots_ = 0;   ///< slots from the next frame on
   bool is_small_ = false;            ///< slots may run out within one pass
   bool slots_are_scarce_ = true;     ///< free slots may not suffice for the next passes

@@ -40,7 +40,7 @@ constexpr std::uint64_t kLeastPart = 2;
 /// Least initial size of a cache, 2^14 slots (5.3 MB), or all blocks if there are fewer: a frame of
 /// a small noisy volume needs most of its blocks.
 constexpr std::uint64_t kFewSlots = 1 << 14;
-/// A frame that frees a smaller part of its slots for itself finds enough of them.
+/// A frame that lacks a smaller part of its slots finds enough of them.
 constexpr std::uint32_t kSparePart = 32;
 /// A cache grows to so many times as many slots at most.
 constexpr std::uint64_t kMostGrowth = 4;
@@ -153,11 +153,11 @@ std::uint32_t first_cache_slots(std::uint64_t num_blocks, std::uint64_t num_rays
       std::clamp<std::uint64_t>(slots, kMinCacheSlots, ISO_MAX_CACHE_SLOTS));
 }
 
-std::uint32_t grown_cache_slots(const MemoryPlan &plan, std::uint64_t recycled) {
+std::uint32_t grown_cache_slots(const MemoryPlan &plan, std::uint64_t lacking) {
   const std::uint64_t slots = plan.cache_slots;
-  if (!plan.can_grow() || recycled <= slots / kSparePart) return plan.cache_slots;
+  if (!plan.can_grow() || lacking <= slots / kSparePart) return plan.cache_slots;
   // Blocks may have been freed and requested again and again, and count as often.
-  const std::uint64_t wanted = std::min((slots + recycled) / 4 * 5, kMostGrowth * slots);
+  const std::uint64_t wanted = std::min((slots + lacking) / 4 * 5, kMostGrowth * slots);
   return static_cast<std::uint32_t>(std::min<std::uint64_t>(wanted, plan.most_slots));
 }
 

@@ -105,9 +105,9 @@ MemoryPlan resized(MemoryPlan plan, std::uint32_t cache_slots);
 std::uint32_t first_cache_slots(std::uint64_t num_blocks, std::uint64_t num_rays,
                                 bool with_further_rays = false);
 
-/// Slots for the next frame, after one that has freed `recycled` slots of blocks that it had
-/// requested itself; plan.cache_slots if these are enough.
-std::uint32_t grown_cache_slots(const MemoryPlan &plan, std::uint64_t recycled);
+/// Slots for the next frame, after one that lacked `lacking` of them; plan.cache_slots if these are
+/// enough.
+std::uint32_t grown_cache_slots(const MemoryPlan &plan, std::uint64_t lacking);
 
 /// The plan of a field that is the volume itself, and shares its blocks.
 FieldPlan plan_shared_field();

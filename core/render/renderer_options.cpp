@@ -98,8 +98,7 @@ MemoryPlan plan_of_volume(const ocl::Device &device, const CompressedVolume &vol
     return plan;
   }
   const bool grows = options.memory_budget == 0;
-  const std::uint64_t ample = (options.max_surfaces != 0 ? kLayersFactor : 1) * kAmpleCacheSlots;
-  const std::uint64_t most = grows ? ample : std::uint64_t{ISO_MAX_CACHE_SLOTS};
+  const std::uint64_t most = grows ? kAmpleCacheSlots : ISO_MAX_CACHE_SLOTS;
   const auto max_slots =
       static_cast<std::uint32_t>(std::clamp<std::uint64_t>(num_blocks, kMinCacheSlots, most));
   return grows ? plan_to_grow(device, volume, request, budget, max_slots, options.first_slots)

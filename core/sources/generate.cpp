@@ -74,6 +74,8 @@ class GeneratedReader : public VolumeReader {
     });
   }
 
+  DeviceVoxels *on_device() override { return made_ ? made_->in_place() : nullptr; }
+
   /// The voxels in their own type.
   void read_stored(std::uint32_t z_begin, std::uint32_t num_layers, std::span<std::byte> out) {
     check_range(z_begin, num_layers, out.size() / size_of(info_.type));

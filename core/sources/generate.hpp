@@ -78,6 +78,8 @@ class NoiseVoxels {
   /// The bytes of voxels [num_layers][ny][nx] from layer z_begin on.
   virtual void evaluate(std::uint32_t z_begin, std::uint32_t num_layers,
                         std::span<std::byte> voxels) = 0;
+  /// VolumeReader::on_device().
+  virtual DeviceVoxels *in_place() { return nullptr; }
 };
 using NoiseMaker = std::function<std::unique_ptr<NoiseVoxels>(
     const NoiseField &field, const glm::uvec3 &dims, VoxelType type)>;

@@ -52,6 +52,7 @@ class RespacedReader : public VolumeReader {
                          std::span<double> out) override {
     source_->read_exact_layers(z_begin, num_layers, out);
   }
+  DeviceVoxels *on_device() override { return source_->on_device(); }
 
  private:
   std::unique_ptr<VolumeReader> source_;

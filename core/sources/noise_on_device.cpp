@@ -1,5 +1,7 @@
 #include "core/sources/noise_on_device.hpp"
 
+#include <array>
+#include <limits>
 #include <memory>
 #include <stdexcept>
 
@@ -33,20 +35,32 @@ ocl::Defines defines_for(VoxelType type) {
   return {{"ISO_VOXEL", "double"}, {"ISO_LARGEST_VOXEL", "0"}};
 }
 
-/// With a device of its own.
+/// With a device of its own, if layers are read.
 class OwnDeviceNoise : public NoiseVoxels {
  public:
-  OwnDeviceNoise(const ocl::DeviceInfo &device, const NoiseField &field, const glm::uvec3 &dims,
-                 VoxelType type)
-      : device_(device), noise_(device_, field, dims, type) {}
+  /// encoder  the device that may encode the voxels, or null
+  OwnDeviceNoise(const ocl::DeviceInfo &info, ocl::Device *encoder, const NoiseField &field,
+                 const glm::uvec3 &dims, VoxelType type)
+      : info_(info), encoder_(encoder), field_(field), dims_(dims), type_(type) {}
   void evaluate(std::uint32_t z_begin, std::uint32_t num_layers,
                 std::span<std::byte> voxels) override {
-    noise_.evaluate(z_begin, num_layers, voxels);
+    if (!noise_) noise_.emplace(device_.emplace(info_), field_, dims_, type_);
+    noise_->evaluate(z_begin, num_layers, voxels);
+  }
+  DeviceVoxels *in_place() override {
+    if (encoder_ == nullptr || !NoiseInPlace::suits(type_)) return nullptr;
+    return &in_place_.emplace(*encoder_, field_, type_);
   }
 
  private:
-  ocl::Device device_;
-  NoiseOnDevice noise_;
+  ocl::DeviceInfo info_;
+  ocl::Device *encoder_;
+  NoiseField field_;
+  glm::uvec3 dims_;
+  VoxelType type_;
+  std::optional<ocl::Device> device_{};
+  std::optional<NoiseOnDevice> noise_{};
+  std::optional<NoiseInPlace> in_place_{};
 };
 
 }  // namespace
@@ -79,11 +93,47 @@ void NoiseOnDevice::evaluate(std::uint32_t z_begin, std::uint32_t num_layers,
   voxels_->read(voxels);
 }
 
-NoiseMaker noise_on(const ocl::DeviceInfo &device) {
-  if (!NoiseOnDevice::suits(device)) return {};
-  return [device](const NoiseField &field, const glm::uvec3 &dims, VoxelType type) {
-    return std::make_unique<OwnDeviceNoise>(device, field, dims, type);
+NoiseInPlace::NoiseInPlace(ocl::Device &device, const NoiseField &field, VoxelType type)
+    : device_(device),
+      shape_(field.shape),
+      octaves_(device_, "octaves", std::span<const NoiseOctave>(field.octaves)),
+      range_(device_, "range of voxels", 2),
+      kernel_(device_, defines_for(type)) {
+  if (!suits(type)) throw std::invalid_argument("NoiseInPlace: voxels of more than 16 bits");
+  range_.write(std::array{std::numeric_limits<cl_int>::max(), std::numeric_limits<cl_int>::min()});
+}
+
+void NoiseInPlace::make(const glm::uvec3 &begin, const glm::uvec3 &dims,
+                        ocl::Buffer<float> &voxels) {
+  if (voxels.size() < std::uint64_t{dims.x} * dims.y * dims.z)
+    throw std::invalid_argument("NoiseInPlace: no room for so many voxels");
+  const std::uint64_t num_runs = std::uint64_t{dims.y} * dims.z * ((dims.x + 3u) / 4u);
+  kernel_(ocl::Range::strided(num_runs, ocl::kGroupSize, device_, 4), octaves_, shape_, dims.x,
+          dims.y, dims.z, begin.x, begin.y, begin.z, voxels, range_);
+}
+
+std::array<float, 2> NoiseInPlace::range() {
+  const std::vector<cl_int> found = range_.read();
+  return {static_cast<float>(found[0]), static_cast<float>(found[1])};
+}
+
+namespace {
+
+NoiseMaker noise_on(const ocl::DeviceInfo &info, ocl::Device *encoder) {
+  if (!NoiseOnDevice::suits(info)) return {};
+  return [info, encoder](const NoiseField &field, const glm::uvec3 &dims, VoxelType type) {
+    return std::make_unique<OwnDeviceNoise>(info, encoder, field, dims, type);
   };
+}
+
+}  // namespace
+
+NoiseMaker noise_on(const ocl::DeviceInfo &device) {
+  return noise_on(device, nullptr);
+}
+
+NoiseMaker noise_on(ocl::Device &device) {
+  return noise_on(device.info(), &device);
 }
 
 }  // namespace isowave::core

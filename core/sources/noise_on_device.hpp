@@ -8,6 +8,7 @@
 
 #include "core/sources/generate.hpp"
 #include "core/sources/noise_field.hpp"
+#include "core/stages/zfp_encode.hpp"
 #include "kernels/noise_field.hpp"
 
 namespace isowave::core {
@@ -37,8 +38,29 @@ class NoiseOnDevice : public NoiseVoxels {
   ocl::Kernel<kernels::noise_field> kernel_;
 };
 
-/// GenerateOptions::noise by a device, if it suits: opened once more for each volume, since layers
-/// are read beside other work on it.
+/// The field's voxels, made by the device that encodes them. Nothing of them comes to the host.
+class NoiseInPlace : public VoxelsInPlace {
+ public:
+  /// Whether voxels of the type can be made so.
+  static bool suits(VoxelType type) { return size_of(type) <= 2; }
+
+  /// device  must outlive this
+  NoiseInPlace(ocl::Device &device, const NoiseField &field, VoxelType type);
+  void make(const glm::uvec3 &begin, const glm::uvec3 &dims, ocl::Buffer<float> &voxels) override;
+  std::array<float, 2> range() override;
+
+ private:
+  ocl::Device &device_;
+  NoiseShape shape_;
+  ocl::Buffer<NoiseOctave> octaves_;
+  ocl::Buffer<cl_int> range_;
+  ocl::Kernel<kernels::noise_in_place> kernel_;
+};
+
+/// GenerateOptions::noise by a device, if it suits: opened once more for each volume whose layers
+/// are read, since they are read beside other work on it.
 NoiseMaker noise_on(const ocl::DeviceInfo &device);
+/// The same. What this device encodes, it also makes; it must outlive the readers.
+NoiseMaker noise_on(ocl::Device &device);
 
 }  // namespace isowave::core

@@ -115,20 +115,38 @@ void LayerEncoder::encode(std::span<const float> voxels, std::uint32_t num_layer
   const std::uint64_t layer = std::uint64_t{dims_.x} * dims_.y;
   if (voxels.size() != layer * num_layers)
     throw std::invalid_argument("LayerEncoder: not whole layers");
+  encode_pieces(
+      num_layers,
+      [&](const glm::uvec3 &begin, const glm::uvec3 &dims) {
+        const std::uint64_t rows = std::uint64_t{dims.x} * dims.y;
+        // Waits for the piece before, which still reads the buffer.
+        if (rows == layer) return voxels_.write(voxels.subspan(begin.z * layer, layer * dims.z));
+        for (std::uint32_t i = 0; i < dims.z; ++i) {
+          voxels_.write(
+              voxels.subspan((begin.z + i) * layer + std::uint64_t{begin.y} * dims.x, rows),
+              i * rows);
+        }
+      },
+      sink);
+}
+
+void LayerEncoder::encode(VoxelsInPlace &voxels, const Sink &sink, const Progress &progress) {
+  encode_pieces(
+      dims_.z,
+      [&](const glm::uvec3 &begin, const glm::uvec3 &dims) {
+        voxels.make(begin, dims, voxels_);  // behind the kernels of the piece before
+        if (progress && begin.y + dims.y == dims_.y) progress(begin.z + dims.z, dims_.z);
+      },
+      sink);
+}
+
+template <class Fill>
+void LayerEncoder::encode_pieces(std::uint32_t num_layers, const Fill &fill, const Sink &sink) {
   for (std::uint32_t z = 0; z < num_layers; z += piece_dims_.z) {
     for (std::uint32_t y = 0; y < dims_.y; y += piece_dims_.y) {
       const glm::uvec3 dims(dims_.x, std::min(piece_dims_.y, dims_.y - y),
                             std::min(piece_dims_.z, num_layers - z));
-      const std::uint64_t rows = std::uint64_t{dims.x} * dims.y;
-      // Waits for the piece before, which still reads the buffer.
-      if (rows == layer) {
-        voxels_.write(voxels.subspan(z * layer, layer * dims.z));
-      } else {
-        for (std::uint32_t i = 0; i < dims.z; ++i) {
-          voxels_.write(voxels.subspan((z + i) * layer + std::uint64_t{y} * dims.x, rows),
-                        i * rows);
-        }
-      }
+      fill(glm::uvec3(0, y, z), dims);
       const bool has_previous = std::exchange(in_flight_, true);
       std::swap(*current_, *previous_);
       enqueue_piece(dims);
@@ -183,11 +201,19 @@ class DeviceCoder : public LevelCoder {
       : device_(device),
         encoder_(device, dims, 64 * options.rate, options.measure_error, BlockErrors(keep)),
         measure_error_(options.measure_error),
+        progress_(options.input.progress),
         sink_(sink) {}
 
   void end_chunk(const Chunk &chunk) override {
     if (measure_error_) encoder_.errors().add_lost(chunk.lost);
     encoder_.encode(chunk.voxels, chunk.num_layers, sink_);
+  }
+
+  std::optional<std::array<float, 2>> code_made(DeviceVoxels &voxels) override {
+    auto *in_place = dynamic_cast<VoxelsInPlace *>(&voxels);
+    if (in_place == nullptr) return {};
+    encoder_.encode(*in_place, sink_, progress_);
+    return in_place->range();
   }
 
   std::vector<float> finish(CompressedVolume &volume) override {
@@ -203,6 +229,7 @@ class DeviceCoder : public LevelCoder {
   ocl::Device &device_;
   LayerEncoder encoder_;
   bool measure_error_;
+  Progress progress_;
   const PayloadSink &sink_;
 };
 

@@ -1,6 +1,7 @@
 #pragma once
 // Voxels -> zfp blocks at a fixed rate, on a device.
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -50,6 +51,20 @@ class ZfpEncode {
   ocl::Kernel<kernels::zfp_encode_errors> measure_;
 };
 
+/// Voxels that the encoder's device makes.
+class VoxelsInPlace : public DeviceVoxels {
+ public:
+  /// Makes voxels [dims.z][dims.y][dims.x] from `begin` on, which are whole numbers below 2^24.
+  ///
+  /// Waits  no
+  virtual void make(const glm::uvec3 &begin, const glm::uvec3 &dims,
+                    ocl::Buffer<float> &voxels) = 0;
+  /// The least and the greatest of all that were made.
+  ///
+  /// Waits  yes
+  virtual std::array<float, 2> range() = 0;
+};
+
 /// Encodes a volume from its first layer to its last, in pieces of bounded size: while the device
 /// works on one, the caller prepares the next.
 class LayerEncoder {
@@ -72,6 +87,10 @@ class LayerEncoder {
   /// volume's end. Done with `voxels` when it returns. The pieces before the last one enqueued go
   /// to `sink`, called from this thread.
   void encode(std::span<const float> voxels, std::uint32_t num_layers, const Sink &sink);
+  /// Encodes all layers of a volume whose voxels the device makes.
+  ///
+  /// progress  called with layers that were enqueued, and all; or none
+  void encode(VoxelsInPlace &voxels, const Sink &sink, const Progress &progress);
   /// Hands the last piece to `sink`.
   void finish(const Sink &sink);
 
@@ -87,6 +106,9 @@ class LayerEncoder {
   };
 
   ocl::BufferSizes own_sizes() const { return sizes(dims_, bits_per_block_, measure_error_); }
+  /// Calls fill(begin, dims) for the pieces of so many layers, and encodes what voxels_ has then.
+  template <class Fill>
+  void encode_pieces(std::uint32_t num_layers, const Fill &fill, const Sink &sink);
   void enqueue_piece(const glm::uvec3 &dims);
   void hand_over(const Result &result, const Sink &sink);
 

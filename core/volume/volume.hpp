@@ -99,6 +99,13 @@ inline constexpr std::uint32_t kMaxDim = 1u << 16;
 inline constexpr double kLeastDeterminant = 1e-6;  ///< of a direction that can be inverted
 
 /// Reads a volume as float32 without holding all of it. Not thread-safe.
+/// Voxels that a device can make where they are needed. Rooms that know devices say how
+/// (core/stages/zfp_encode.hpp).
+class DeviceVoxels {
+ public:
+  virtual ~DeviceVoxels() = default;
+};
+
 class VolumeReader {
  public:
   virtual ~VolumeReader() = default;
@@ -119,6 +126,8 @@ class VolumeReader {
   /// does not hold (fits_float32()) must override this one, which throws std::logic_error for them.
   virtual void read_exact_layers(std::uint32_t z_begin, std::uint32_t num_layers,
                                  std::span<double> out);
+  /// The voxels of read_layers(), made by a device; null: they must be read. Lives as long as this.
+  virtual DeviceVoxels *on_device() { return nullptr; }
 
  protected:
   VolumeInfo info_;

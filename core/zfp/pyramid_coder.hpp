@@ -1,6 +1,7 @@
 #pragma once
 // Compresses a volume and its levels of detail, chunk by chunk.
 
+#include <array>
 #include <cstddef>
 #include <functional>
 #include <memory>
@@ -31,6 +32,9 @@ class LevelCoder : public ChunkCoder {
   /// After the last chunk: hands over what is left, and completes `volume`. Returns the errors of
   /// blocks that were to be kept, if they were measured.
   virtual std::vector<float> finish(CompressedVolume &volume) = 0;
+  /// Compresses all voxels in place of chunks, where a device makes them. Returns their least and
+  /// greatest; none if this coder cannot, and has done nothing.
+  virtual std::optional<std::array<float, 2>> code_made(DeviceVoxels & /*voxels*/) { return {}; }
   /// The last chunk's voxels as they are decoded, if errors are measured.
   virtual std::span<const float> decoded() const = 0;
 };
@@ -54,6 +58,10 @@ class PyramidCoder : public ChunkCoder {
     coder_->code_row(row, thread);
   }
   void end_chunk(const Chunk &chunk) override;
+  /// As LevelCoder::code_made(). None if coarser levels need the voxels.
+  std::optional<std::array<float, 2>> code_made(DeviceVoxels &voxels) {
+    return next_ ? std::nullopt : coder_->code_made(voxels);
+  }
 
   /// After the last chunk: completes all volumes.
   ///

@@ -29,7 +29,10 @@ std::vector<CompressedVolume *> all_levels(CompressedVolume &volume) {
 void run(VolumeReader &reader, const CompressOptions &options, std::span<const PayloadSink> sinks,
          CompressedVolume &volume) {
   PyramidCoder coder(options, all_levels(volume), sinks, true, !volume.coarser_levels.empty());
-  volume.value_range = read_in_chunks(reader, input_of(options), coder).coded;
+  std::optional<std::array<float, 2>> made;
+  if (DeviceVoxels *voxels = reader.on_device(); voxels != nullptr && !options.input.no_data)
+    made = coder.code_made(*voxels);
+  volume.value_range = made ? *made : read_in_chunks(reader, input_of(options), coder).coded;
   coder.finish();
 }
 

@@ -38,6 +38,9 @@ ISO_INLINE void stamp_read(volatile global uint *slot_stamps, uint slot, uint st
 #define ISO_RANKS_OF_FRAME \
   (2 * ISO_CLASS_RANKS)  ///< those below are of slots that the frame at work has used
 
+#define ISO_RANKS_OF_EARLIER \
+  (4 * ISO_CLASS_RANKS)  ///< ... these and those above, of slots used neither in it nor in the last
+
 /// Slots are freed from rank ISO_EVICTION_RANKS - 1 down. Rank 0: needed at the end of the pass
 /// that `counts` are of, or later. Not in the paper, whose cache is strictly LRU. There are five
 /// classes, freed in this order:
@@ -57,7 +60,7 @@ ISO_INLINE uint eviction_rank(uint stamp, global const PassCounts *counts) {
   uint rank = 0;
   /* Differences, since the clock of the stamps wraps. */
   if ((int)(stamp - last_begin) < 0) {
-    rank = 4 * ISO_CLASS_RANKS + min((last_begin - stamp) / 2, 4 * ISO_CLASS_RANKS - 1);
+    rank = ISO_RANKS_OF_EARLIER + min((last_begin - stamp) / 2, 4 * ISO_CLASS_RANKS - 1);
   } else if ((int)(stamp - begin) < 0) {
     rank = (is_unread ? 3 : 2) * ISO_CLASS_RANKS + min((begin - stamp) / 2, oldest);
   } else if ((int)(stamp - now) < 0) {

@@ -59,7 +59,7 @@ CompressedVolume convert_together(const ConvertArgs &options, const RawOverrides
     if (options.device) {
       device.emplace(choose_local_device(*options.device, MpiJob::local_rank()));
       compress.encoder = encoder_on(*device);
-      noise = noise_on(device->info());
+      noise = noise_on(*device);
     }
     info = open_any_volume(options.path, overrides, noise)->info();
     warn_of_header(options.path, overrides);
@@ -83,7 +83,7 @@ CompressedVolume convert_alone(const ConvertArgs &options, const RawOverrides &o
   if (options.device) {
     device.emplace(ocl::choose_device(*options.device));
     compress.encoder = encoder_on(*device);
-    noise = noise_on(device->info());
+    noise = noise_on(*device);
   }
   const std::unique_ptr<VolumeReader> reader = open_any_volume(options.path, overrides, noise);
   warn_of_header(options.path, overrides);

@@ -16,7 +16,7 @@ void add_renderer_options(CLI::App &app, RendererFlags &flags) {
   app.add_option(
          "--cache-slots", flags.values.cache_slots,
          "number of decoded blocks kept on the device, 8 to 2^26 [with a budget as many as it "
-         "allows, without one as many as frames need, growing to 2^20]")
+         "allows, without one as many as frames need, growing to 2^22]")
       ->check(CLI::Range(8u, 1u << 26));
   app.add_option("--stream", flags.stream,
                  "place of the compressed volume: device, host (blocks are uploaded on request), "

@@ -165,7 +165,7 @@ Storage storage_for(const std::string &path, const CompressionOptions &compressi
   Storage storage = to_storage(compression);
   if (device != nullptr) {
     storage.encoder = encoder_on(*device);
-    storage.noise = noise_on(device->info());
+    storage.noise = noise_on(*device);
   }
   return storage;
 }

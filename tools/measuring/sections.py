@@ -26,7 +26,11 @@ SECTIONS = {
         gpu_peers.gpu_peer,
         paper.paper,
         paper.devices,
-        bricks.bricks,
+        bricks.bricks_weak,
+        bricks.bricks_strong,
+        bricks.bricks_exact,
+        bricks.bricks_large,
+        bricks.bricks_alone,
         accuracy.bits,
         accuracy.oracles,
         accuracy.certified,
@@ -39,6 +43,8 @@ SECTIONS = {
         accuracy.topology,
     )
 }
+# Names of --only that stand for several.
+GROUPS = {"bricks": bricks.PARTS}
 NEED_VOLUMES = (
     "bits",
     "oracles",
@@ -55,6 +61,6 @@ NEED_VOLUMES = (
 PROGRAMS = {
     "peer": "bench/peer_bench",
     "gpu_peer": "bench/gpu_peer",
-    "bricks": "bench/brick_bench",
+    **{name: "bench/brick_bench" for name in (*bricks.PARTS, "bricks_alone")},
     "cpus": AS_CPU,
 }

@@ -544,7 +544,7 @@ TABLES = {
         ("gpu_peer", gpu_peers.gpu_peers),
         ("paper", *paper_article.TABLES, *paper_tables.TABLES),
         ("devices", paper_tables.by_device),
-        ("bricks", bricks.in_bricks),
+        *bricks.TABLES,
         ("bits", bits),
         ("oracles", oracles),
         ("certified", certified),
