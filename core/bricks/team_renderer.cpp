@@ -496,6 +496,7 @@ std::vector<HitRecord> TeamRenderer::compose_hits(std::span<const HitRecord> own
 FrameArrays TeamRenderer::fetch(const WantedArrays &wanted, const Appearance &appearance) {
   check_arrays(wanted, size());
   if (wanted.picture) check_field_colors(appearance);
+  if (is_alone()) return renderer_.fetch(wanted, appearance);
   const bool receives = team_.rank() == 0;
   FrameArrays arrays;
   if (wanted.picture) arrays.picture = compose_picture(appearance);
@@ -551,7 +552,8 @@ HostArray<std::uint8_t> TeamRenderer::compose_picture(const Appearance &appearan
   return picture;
 }
 
-std::uint64_t TeamRenderer::num_hits(const FrameStats &) {
+std::uint64_t TeamRenderer::num_hits(const FrameStats &stats) {
+  if (!num_hits_ && is_alone()) num_hits_ = renderer_.num_hits(stats);
   if (!num_hits_) depth();
   return num_hits_.value();
 }

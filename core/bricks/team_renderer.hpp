@@ -134,6 +134,8 @@ class TeamRenderer : public Renderer {
   std::vector<HitRecord> compose_hits(std::span<const HitRecord> own,
                                       std::span<const HitField> fields,
                                       Receiver who = Receiver::kRank0);
+  /// Whether the renderer has all that fetch() shows, since there are no other bricks.
+  bool is_alone() const { return team_.size() == 1 && !layers_so_far_; }
   std::span<const HitRecord> own_hits();
   /// The field's values at the hits that win, at rank 0.
   const std::vector<float> &compose_values();

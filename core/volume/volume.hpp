@@ -98,7 +98,6 @@ void check_volume_info(const VolumeInfo &info, std::string_view what);
 inline constexpr std::uint32_t kMaxDim = 1u << 16;
 inline constexpr double kLeastDeterminant = 1e-6;  ///< of a direction that can be inverted
 
-/// Reads a volume as float32 without holding all of it. Not thread-safe.
 /// Voxels that a device can make where they are needed. Rooms that know devices say how
 /// (core/stages/zfp_encode.hpp).
 class DeviceVoxels {
@@ -106,6 +105,7 @@ class DeviceVoxels {
   virtual ~DeviceVoxels() = default;
 };
 
+/// Reads a volume as float32 without holding all of it. Not thread-safe.
 class VolumeReader {
  public:
   virtual ~VolumeReader() = default;
