@@ -256,27 +256,26 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_ev
     global uint *slot_block_ids, global const uint *slot_stamps, global const uchar *slot_ranks,
     global uint *table, global CacheState *cache, global uint *free_slots) {
   const FrameParams *frame = &frame_params;
-  local uint counters[2];
+  local uint at_cutoff[2], victims[2];
   const uint item = get_local_id(0), cutoff_rank = cache->cutoff_rank;
   const uint searched =
       counts->requested_count != 0 && cutoff_rank < ISO_EVICTION_RANKS ? num_slots : 0;
-  if (item == 0) counters[0] = 0;
+  if (item == 0) at_cutoff[0] = victims[0] = 0;
   barrier(CLK_LOCAL_MEM_FENCE);
   for (uint begin = get_global_id(0) - item; begin < searched; begin += get_global_size(0)) {
-    const uint slot = begin + item;
-    const uint block_id = slot < num_slots ? slot_block_ids[slot] : ISO_INVALID_ID;
-    const int may_go =
-        block_id != ISO_INVALID_ID && slot_stamps[slot] != needed_stamp(counts->pass + 1);
-    const uint rank = may_go ? slot_ranks[slot] : 0;
-    const int is_at_cutoff = may_go && rank == cutoff_rank;
-    const int is_taken =
-        take_place(is_at_cutoff, counters, &cache->num_cutoff) < cache->cutoff_count;
-    const int is_victim = may_go && (rank > cutoff_rank || (is_at_cutoff && is_taken));
-    const uint place = take_place(is_victim, counters, &cache->num_evicted);
+    const uint slot = min(begin + item, num_slots - 1), block_id = slot_block_ids[slot];
+    const uint may_go = begin + item < num_slots && block_id != ISO_INVALID_ID &&
+                        slot_stamps[slot] != needed_stamp(counts->pass + 1);
+    const uint rank = slot_ranks[slot];
+    const uint is_at_cutoff = may_go && rank == cutoff_rank;
+    const uint place = take_place(is_at_cutoff, at_cutoff, &cache->num_cutoff);
+    const uint is_victim =
+        (may_go && rank > cutoff_rank) || (is_at_cutoff && place < cache->cutoff_count);
+    const uint free_place = take_place(is_victim, victims, &cache->num_evicted);
     if (is_victim) {
       remove_block(frame, table, block_coords(frame, block_id));
       slot_block_ids[slot] = ISO_INVALID_ID;
-      free_slots[cache->free_before + place] = slot;
+      free_slots[cache->free_before + free_place] = slot;
     }
   }
 }

@@ -50,9 +50,9 @@ TEST_P(BrickTeamOnDevice, BrickOfAVolumeWithMoreBlocksThanIds) {
   ThreadTeam team(meeting, 0);
   ocl::Device device(GetParam());
   TeamRenderer renderer(device, volume.compressed, {.size = kFrame}, cuts, {whole}, team);
-  renderer.render({.camera = camera, .isovalue = kIsovalue});
+  const FrameStats stats = renderer.render({.camera = camera, .isovalue = kIsovalue});
   EXPECT_EQ(renderer.depth(), depth_of(test::twin_hits(volume, camera, kFrame, kIsovalue)));
-  EXPECT_GT(renderer.num_hits({}), 200u);
+  EXPECT_GT(renderer.num_hits(stats), 200u);
 }
 
 /// Rank 0 of a team whose others have drawn nothing.

@@ -137,7 +137,7 @@ TEST_F(CliHost, OptionsOfDevicesAreRefusedOrTakeADevice) {
 }
 
 TEST_F(CliHost, OtherCommandsSayThatTheyNeedADevice) {
-  const std::string arguments = " bench solvers generate:gyroid_8x8x8_uint8";
+  const std::string arguments = " bench solvers generate:gyroid_8x8x8_uint8:128";
   expect_error_in(kOnlyPocl, arguments + " --device host", "'host' is no OpenCL device");
   expect_error_in(kOnlyPocl + " ISOWAVE_DEVICE=host", arguments, "'host' (from ISOWAVE_DEVICE)");
 }

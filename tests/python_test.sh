@@ -27,7 +27,7 @@ wheel=$(echo "$work"/dist/isowave-*.whl)
 tag=$(/usr/bin/python3 -c 'import sys; v = "cp%d%d" % sys.version_info[:2]
 print("cp312-abi3" if sys.version_info >= (3, 12) else f"{v}-{v}")')
 [[ $wheel == *-$tag-manylinux_* ]] || fail "$wheel is not for $tag"
-unzip -l "$wheel" | grep -q isowave/page.html.gz || fail 'the wheel has no engine for pages'
+unzip -l "$wheel" isowave/page.html.gz > /dev/null || fail 'the wheel has no engine for pages'
 unset ISOWAVE_PAGE
 [ "$(stat -c %s "$wheel")" -lt 2900000 ] || fail "the wheel has $(stat -c %s "$wheel") bytes"
 unzip -l "$wheel" | grep -iE 'embree|gmp|itk|gomp' &&
@@ -56,7 +56,7 @@ rm -rf "$work/fresh"
 /usr/bin/python3 -m venv --without-pip "$work/fresh"
 quietly "$python" -m pip --python "$work/fresh/bin/python" install --quiet --no-compile \
   "$wheel[cpu]"
-loader=$(ldconfig -p | sed -n 's/.*libOpenCL.so.1 .*=> //p' | head -1)
+loader=$(ldconfig -p | sed -n '0,/libOpenCL.so.1 /s/.*libOpenCL.so.1 .*=> //p')
 cat > "$work/picture.py" << 'END'
 import sys
 

@@ -134,7 +134,7 @@ std::optional<std::array<double, 2>> range_of_colors(
 
 /// Gets what the request wants of the frame that was drawn, except bounds.
 void Renderer::Implementation::fetch(const FrameRequest &request, Frame &frame) {
-  const core::WantedArrays wanted{request.want_picture, request.want_depth, request.want_normals,
+  const core::WantedArrays wanted{request.want_picture,   request.want_depth, request.want_normals,
                                   request.want_positions, request.want_field, request.want_hits};
   const core::Appearance appearance = core_appearance(request, whole());
   const auto range = renderer_->field_range();
