@@ -106,7 +106,7 @@ void draw(TeamRenderer &renderer, Team &team, const FrameRequest &request, Frame
   for (const auto &[stage, ms] : stages) frames.stages[stage].push_back(ms);
   const double before = renderer.composition().ms;
   const std::uint64_t given_before = team.given_bytes();
-  renderer.shade({});
+  static_cast<void>(renderer.fetch({.picture = true}, {}));
   frames.picture.push_back(ms_since(begin));
   frames.composition.push_back(renderer.composition().ms - before);
   frames.given.push_back(static_cast<double>(team.given_bytes() - given_before));
