@@ -263,10 +263,11 @@ kernel __attribute__((reqd_work_group_size(ISO_GROUP_SIZE, 1, 1))) void cache_ev
   if (item == 0) at_cutoff[0] = victims[0] = 0;
   barrier(CLK_LOCAL_MEM_FENCE);
   for (uint begin = get_global_id(0) - item; begin < searched; begin += get_global_size(0)) {
-    const uint slot = min(begin + item, num_slots - 1), block_id = slot_block_ids[slot];
-    const uint may_go = begin + item < num_slots && block_id != ISO_INVALID_ID &&
-                        slot_stamps[slot] != needed_stamp(counts->pass + 1);
-    const uint rank = slot_ranks[slot];
+    const uint slot = begin + item;
+    const uint block_id = slot < num_slots ? slot_block_ids[slot] : ISO_INVALID_ID;
+    const uint may_go =
+        block_id != ISO_INVALID_ID && slot_stamps[slot] != needed_stamp(counts->pass + 1);
+    const uint rank = may_go ? slot_ranks[slot] : 0;
     const uint is_at_cutoff = may_go && rank == cutoff_rank;
     const uint place = take_place(is_at_cutoff, at_cutoff, &cache->num_cutoff);
     const uint is_victim =

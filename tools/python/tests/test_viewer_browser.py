@@ -101,7 +101,8 @@ def test_the_page_loads_without_errors_or_foreign_requests(
     first_ms = page.evaluate("document.querySelector('main').dataset.firstMs")
     record_property("first_picture_ms", first_ms)
     stages = [p["stage"] for p in page.evaluate("window.shownPictures")]
-    assert stages[0] == "first" and stages[-2:] == ["whole", "lossless"]
+    # The host, which draws while the device's kernels are compiled, may show a pass first.
+    assert stages[0] in ("first", "pass") and stages[-2:] == ["whole", "lossless"]
 
 
 def test_the_picture_is_the_renderers(page: Any, server: Server) -> None:

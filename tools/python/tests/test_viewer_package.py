@@ -169,7 +169,8 @@ def test_welcome_and_status_tell_of_volume_and_device(front: Front) -> None:
     assert low < welcome["isovalue"] < high
     histogram = front.wait(type="histogram")
     assert sum(histogram["counts"]) > 0 and histogram["range"] == [low, high]
-    assert status["device"] in [device["name"] for device in isowave.devices()]
+    # The host draws while the device's kernels are compiled.
+    assert status["device"] in ["host", *(device["name"] for device in isowave.devices())]
     assert 0 < status["memory_bytes"] <= 1 << 28
 
 
