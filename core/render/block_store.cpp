@@ -17,9 +17,9 @@ namespace {
 /// Caches with fewer slots may run out of slots within one pass, unless they are made for the
 /// blocks that a frame needs (MemoryPlan::can_grow()), or for all blocks.
 constexpr std::uint32_t kSmallCache = 1u << 16;
-/// A frame that decodes less than one block for so many slots counts as a repeated one.
+/// A frame repeats the one before if it decodes at most this part of the slots.
 constexpr std::uint32_t kFewBlocksPart = 32;
-/// Slots are scarce if fewer than one of so many are free: half of what is freed at a time
+/// Slots are scarce if less than this part of them is free. It is half of what is freed at a time
 /// (ISO_SPARE_PART), so that most passes free none.
 constexpr std::uint32_t kScarcePart = 16;
 
@@ -260,8 +260,8 @@ void BlockStore::note_empty() {
   filling_ = {.free_slots = cache.num_slots};
 }
 
-/// Blocks that the frame which ends has freed, if it is the second that fills the cache: they are
-/// those of the frame before, of which the next frame would see many again. 0 else.
+/// Blocks that the second frame in an empty cache has freed; 0 after other frames. They are the
+/// first frame's, and the next frame would see many of them again.
 std::uint64_t BlockStore::lacked_by_second_frame() {
   const auto [decoded, evicted] =
       std::pair(std::exchange(filling_.decoded, 0), std::exchange(filling_.evicted, 0));

@@ -106,7 +106,7 @@ NoiseInPlace::NoiseInPlace(ocl::Device &device, const NoiseField &field, VoxelTy
 void NoiseInPlace::make(const glm::uvec3 &begin, const glm::uvec3 &dims,
                         ocl::Buffer<float> &voxels) {
   if (voxels.size() < std::uint64_t{dims.x} * dims.y * dims.z)
-    throw std::invalid_argument("NoiseInPlace: no room for so many voxels");
+    throw std::invalid_argument("NoiseInPlace: the buffer is too small for the voxels");
   const std::uint64_t num_runs = std::uint64_t{dims.y} * dims.z * ((dims.x + 3u) / 4u);
   kernel_(ocl::Range::strided(num_runs, ocl::kGroupSize, device_, 4), octaves_, shape_, dims.x,
           dims.y, dims.z, begin.x, begin.y, begin.z, voxels, range_);

@@ -170,7 +170,11 @@ def test_welcome_and_status_tell_of_volume_and_device(front: Front) -> None:
     histogram = front.wait(type="histogram")
     assert sum(histogram["counts"]) > 0 and histogram["range"] == [low, high]
     # The host draws while the device's kernels are compiled.
-    assert status["device"] in ["host", *(device["name"] for device in isowave.devices())]
+    names = [device["name"] for device in isowave.devices()]
+    with front.changed:
+        assert front.changed.wait_for(
+            lambda: any(head.get("device") in names for head in front.heads), TIMEOUT
+        )
     assert 0 < status["memory_bytes"] <= 1 << 28
 
 
